@@ -7,7 +7,8 @@ nearest valid name. The command line prints that line and exits with code 2.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 _LONGEST_VALUE = 60
@@ -83,6 +84,18 @@ class ThreadError(ChilopodError, RuntimeError):
 
 class ClusterError(ChilopodError, RuntimeError):
     """A cluster does not answer, differs from this machine in its software, or was lost."""
+
+
+@contextmanager
+def concerning(field: str | None = None, *, within: str = "", source: str | None = None) -> Iterator[None]:
+    """Errors of this block concern this field, or one within something, or are in this source."""
+    try:
+        yield
+    except ChilopodError as error:
+        error.field = error.field if field is None else field
+        error.field = f"{within} {error.field or ''}".strip() if within else error.field
+        error.source = error.source if source is None else source
+        raise
 
 
 def nearest_name(name: str, valid: Iterable[str]) -> str | None:

@@ -29,11 +29,12 @@ class _Package(ModuleType):
 
 def exports(package: str, names: Mapping[str, Sequence[str]]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """``__getattr__`` and ``__dir__`` for the module of a package; ``names`` are those that each of its submodules
-    exports."""
+    exports, and its ``__all__`` unless it has one."""
     homes = {name: f"{package}.{submodule}" for submodule, given in names.items() for name in given}
     module = sys.modules[package]
     module.__class__ = _Package
     module.__dict__["_homes"] = homes
+    module.__dict__["__all__"] = sorted(homes, key=lambda name: (not name.isupper(), name))
 
     def load(name: str) -> Any:
         if name not in homes:

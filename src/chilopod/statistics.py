@@ -154,24 +154,20 @@ def ratio(of: ArrayLike, to: ArrayLike) -> Estimate:
 
 
 def grouped_mean(values: ArrayLike) -> Estimate:
-    """Mean of the finite numbers in independent groups, shape (groups, members), such as courses of targets: members of
-    a group may depend on each other."""
+    """Mean of the finite numbers in independent groups, shape (groups, members), whose members may be dependent."""
     table = np.asarray(values, dtype=np.float64)
     known = np.isfinite(table)
     return ratio(np.where(known, table, 0.0).sum(axis=1), known.sum(axis=1))
 
 
 def share(reached: ArrayLike) -> Interval:
-    """Share of True in independent groups, shape (groups,) or (groups, members).
-
-    The interval is Wilson's (1927), with as many trials as independent ones would scatter as the shares of the groups
-    do: the number of groups at least, that of all members at most. ParameterError for other values than True and False.
-    """
+    """Share of True in independent groups, shape (groups,) or (groups, members). The interval is Wilson's (1927), with
+    as many trials as independent ones would scatter as the shares of the groups do: the number of groups at least, that
+    of all members at most. ParameterError for other values than True and False."""
     table = np.asarray(reached, dtype=np.float64)
     if (wrong := table[(table != 0.0) & (table != 1.0)]).size:
-        raise ParameterError(
-            "must be True or False", field="reached", value=float(wrong[0]), allowed="True, False, 1, 0"
-        )
+        allowed = "True, False, 1, 0"
+        raise ParameterError("must be True or False", field="reached", value=float(wrong[0]), allowed=allowed)
     if table.size == 0:
         return Interval(math.nan, math.nan, math.nan)
     table = table.reshape(len(table), -1)
@@ -188,9 +184,7 @@ def share(reached: ArrayLike) -> Interval:
 def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Estimate:
     """Mean of some trials minus that of others, shapes (n,) and (m,), by Welch's test; only finite numbers count.
 
-    Paired trials have equal indices, as those of one seed, and the error is that of their differences. ParameterError
-    if their numbers differ.
-    """
+    Paired trials have equal indices, and the error is that of their differences; ParameterError for other numbers."""
     if paired:
         if np.shape(one) != np.shape(other):
             raise ParameterError(f"has the wrong shape {np.shape(other)}", field="other", allowed=str(np.shape(one)))
@@ -214,11 +208,9 @@ def spread_difference(one: ArrayLike, other: ArrayLike) -> Estimate:
 
 
 def propagated(of: Callable[[Array], ArrayLike], trials: Array, *, reciprocal: bool = False) -> list[Estimate]:
-    """Numbers from the means of conditions, with the errors that their scatter gives them, to first order.
-
-    ``of`` gives the numbers of a table of trials, shape (conditions, trials), NaN where there is none. The trials of
-    every condition are moved by their standard error to both sides.
-    """
+    """Numbers from the means of conditions, with the errors that their scatter gives them, to first order. ``of`` gives
+    the numbers of a table of trials, shape (conditions, trials), NaN where there is none. The trials of every condition
+    are moved by their standard error to both sides."""
     values, steps = np.atleast_1d(of(trials)), np.sqrt(_row_variances(trials)[0])
     effects = np.zeros((len(steps), values.size))
     for row, step in enumerate(np.nan_to_num(steps)):
@@ -226,19 +218,15 @@ def propagated(of: Callable[[Array], ArrayLike], trials: Array, *, reciprocal: b
             move = step * (np.arange(len(steps)) == row)[:, None]
             above, below = (np.atleast_1d(of(trials + each)) for each in (move, -move))
             effects[row] = (1.0 / below - 1.0 / above if reciprocal else above - below) / (2.0 * step)
-    scales = values**2 if reciprocal else np.ones(values.size)
-    return [
-        weighted(float(value), scale * effect, trials, reciprocal=reciprocal)
-        for value, scale, effect in zip(values, scales, effects.T, strict=True)
-    ]
+    effects *= values**2 if reciprocal else 1.0
+    pairs = zip(values, effects.T, strict=True)
+    return [weighted(float(value), effect, trials, reciprocal=reciprocal) for value, effect in pairs]
 
 
 def weighted(value: float, effects: Array, trials: Array, *, reciprocal: bool = False) -> Estimate:
-    """A number and its error by the scatter of trials, shape (conditions, trials), NaN where there is none.
-
-    ``effects`` are derivatives of the number with respect to the mean of every condition. A single trial is taken to
-    scatter as those of the other conditions do.
-    """
+    """A number and its error by the scatter of trials, shape (conditions, trials), NaN where there is none. ``effects``
+    are derivatives of the number with respect to the mean of every condition. A single trial is taken to scatter as
+    those of the other conditions do."""
     variances, freedoms = _row_variances(trials)
     error, freedom = _together(effects**2 * variances, freedoms)
     count = int(np.median(np.isfinite(trials).sum(axis=1)))

@@ -5,27 +5,34 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
-    from chilopod.analysis.branch import curved_walks, read_walks, resumed
-    from chilopod.analysis.compare import RobotComparison, compare
-    from chilopod.analysis.cycle_modes import CycleMultipliers
-    from chilopod.analysis.cycle_multipliers import bend_onset, cycle_multipliers, walk_multipliers
-    from chilopod.analysis.map import map
-    from chilopod.analysis.map_result import StabilityMap
-    from chilopod.analysis.parameters import spring_scale
-    from chilopod.analysis.quantities import Onset
-    from chilopod.analysis.radius_law import RadiusLaws, radius_laws
-    from chilopod.analysis.sensitivity import Sensitivity, sensitivity
-    from chilopod.analysis.square_root import SquareRootFit, square_root_fit
-    from chilopod.analysis.straight_walk import (
-        StraightWalk,
-        WalkBifurcation,
-        bifurcations,
-        first_loss,
-        pitchfork,
-        straight_walk,
-    )
-    from chilopod.analysis.uncertainty import Uncertainty, uncertainty
-    from chilopod.analysis.undulation import undulating_walks
+    from chilopod.analysis.branch import curved_walks as curved_walks
+    from chilopod.analysis.branch import read_walks as read_walks
+    from chilopod.analysis.branch import resumed as resumed
+    from chilopod.analysis.compare import RobotComparison as RobotComparison
+    from chilopod.analysis.compare import compare as compare
+    from chilopod.analysis.cycle_modes import CycleMultipliers as CycleMultipliers
+    from chilopod.analysis.cycle_multipliers import bend_onset as bend_onset
+    from chilopod.analysis.cycle_multipliers import cycle_multipliers as cycle_multipliers
+    from chilopod.analysis.cycle_multipliers import walk_multipliers as walk_multipliers
+    from chilopod.analysis.map import map as map
+    from chilopod.analysis.map_result import StabilityMap as StabilityMap
+    from chilopod.analysis.parameters import spring_scale as spring_scale
+    from chilopod.analysis.quantities import Onset as Onset
+    from chilopod.analysis.radius_law import RadiusLaws as RadiusLaws
+    from chilopod.analysis.radius_law import radius_laws as radius_laws
+    from chilopod.analysis.sensitivity import Sensitivity as Sensitivity
+    from chilopod.analysis.sensitivity import sensitivity as sensitivity
+    from chilopod.analysis.square_root import SquareRootFit as SquareRootFit
+    from chilopod.analysis.square_root import square_root_fit as square_root_fit
+    from chilopod.analysis.straight_walk import StraightWalk as StraightWalk
+    from chilopod.analysis.straight_walk import WalkBifurcation as WalkBifurcation
+    from chilopod.analysis.straight_walk import bifurcations as bifurcations
+    from chilopod.analysis.straight_walk import first_loss as first_loss
+    from chilopod.analysis.straight_walk import pitchfork as pitchfork
+    from chilopod.analysis.straight_walk import straight_walk as straight_walk
+    from chilopod.analysis.uncertainty import Uncertainty as Uncertainty
+    from chilopod.analysis.uncertainty import uncertainty as uncertainty
+    from chilopod.analysis.undulation import undulating_walks as undulating_walks
 else:
     __getattr__, __dir__ = exports(
         __name__,
@@ -53,34 +60,3 @@ else:
             "undulation": ("undulating_walks",),
         },
     )
-
-__all__ = [
-    "CycleMultipliers",
-    "Onset",
-    "RadiusLaws",
-    "RobotComparison",
-    "Sensitivity",
-    "SquareRootFit",
-    "StabilityMap",
-    "StraightWalk",
-    "Uncertainty",
-    "WalkBifurcation",
-    "bend_onset",
-    "bifurcations",
-    "compare",
-    "curved_walks",
-    "cycle_multipliers",
-    "first_loss",
-    "map",
-    "pitchfork",
-    "radius_laws",
-    "read_walks",
-    "resumed",
-    "sensitivity",
-    "spring_scale",
-    "square_root_fit",
-    "straight_walk",
-    "uncertainty",
-    "undulating_walks",
-    "walk_multipliers",
-]

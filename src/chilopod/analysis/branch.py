@@ -71,8 +71,6 @@ def curved_walks(
         the curve, over orbit (SI units) and parameter (over the width of the interval).
     side
         +1: positive joint angles, a right turn; -1: the mirror image.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
 
     Returns
     -------
@@ -87,12 +85,7 @@ def curved_walks(
 
     Attributes hold the state for :func:`resumed`, and for the pitchfork its ``criticality`` by the normal form, its
     ``coefficient`` (1/rad^2), the ``direction`` in which the branch leaves it, and ``direction_confirms``, True if that
-    agrees with the verdict.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no pitchfork in the interval.
+    agrees with the verdict. AnalysisError if there is no pitchfork in the interval.
     """
     found = bifurcations(robot, parameter, between)
     forks = [each for each in found if each.point.kind is Kind.PITCHFORK]
@@ -128,26 +121,12 @@ def resumed(
     side: int | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Continue a branch from its end.
+    """Continue a branch of :func:`curved_walks`, :func:`resumed` or :func:`read_walks` from its end; the new points are
+    equal to those of a single run. ParameterError if the branch belongs to another robot, parameter or side, or has
+    left the interval.
 
-    Parameters
-    ----------
-    data
-        Branch from :func:`curved_walks`, :func:`resumed` or :func:`read_walks`.
-    robot, parameter, side
-        Robot, parameter and side of the branch (``side`` None is not compared); the robot's own value of the parameter
-        does not matter.
-    between, points, longest, progress
-        As for :func:`curved_walks`; the interval is by default that of the branch.
-
-    Returns
-    -------
-    Dataset with the new points at its end, equal to those of a single run.
-
-    Raises
-    ------
-    ParameterError
-        If the branch belongs to another robot, parameter or side, or has left the interval.
+    The robot's own value of the parameter does not matter, and ``side`` None is not compared. The other arguments are
+    those of :func:`curved_walks`; the interval is by default that of the branch.
     """
     saved = Robot(**tomllib.loads(data.attrs["robot_toml"]))
     if data.attrs["varied"] != parameter:
@@ -178,13 +157,7 @@ def resumed(
 
 
 def read_walks(path: str | Path) -> xr.Dataset:
-    """Read a branch from its netCDF file.
-
-    Raises
-    ------
-    ParameterError
-        If the file is missing, damaged or edited, or written by another version.
-    """
+    """Read a branch from its netCDF file; ParameterError if that is missing, damaged, edited or of another version."""
     path = Path(path)
     try:
         data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")
@@ -275,10 +248,8 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
     numbers = data.parameter_si.values.tolist(), data.orbit.values, multipliers, data.tangent.values
     scale = np.append(sizes, float(data.attrs["scale"]))
-    points = tuple(
-        BranchPoint(value, orbit, row, tangent, scale, kinds.get(str(special)))
-        for value, orbit, row, tangent, special in zip(*numbers, data.special.values, strict=True)
-    )
+    rows = zip(*numbers, data.special.values, strict=True)
+    points = tuple(BranchPoint(x, orbit, nu, along, scale, kinds.get(str(kind))) for x, orbit, nu, along, kind in rows)
     (ending,) = (each for each in Ending if each.label == data.attrs["ending"])
     return Branch(points, ending, float(data.attrs["step"]))
 
@@ -306,11 +277,11 @@ def _walked(
     weight = np.array([model.robot.weight for model in models])
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
-    verdicts = [
-        Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[stable]
-        for most, stable in zip(means.most_bent, _stability(branch), strict=True)
-    ]
+    pairs = zip(means.most_bent, _stability(branch), strict=True)
+    verdicts = [Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[stable] for most, stable in pairs]
     radius = [float(model.robot.axis_radius(angles)) for model, angles in zip(models, means.mean_angle, strict=True)]
+
+    special = [point.special.label if point.special else "" for point in points]
 
     def column(values: Any, what: str | None = None) -> tuple[Any, ...]:
         return (("point",), np.asarray(values), {} if what is None else {"units": what})
@@ -320,9 +291,7 @@ def _walked(
             "parameter": column([units.from_si(point.value, unit) for point in points], unit),
             "verdict": column(np.array(verdicts, dtype=object)),
             "stable": column([verdict == VERDICTS[True] for verdict in verdicts]),
-            "special": column(
-                np.array([point.special.label if point.special else "" for point in points], dtype=object)
-            ),
+            "special": column(np.array(special, dtype=object)),
             "multiplier": column(np.abs(multipliers[:, 0])),
             "mean_angle": (("point", "joint"), means.mean_angle, {"units": "rad"}),
             "most_bent": column(means.most_bent, "rad"),

@@ -19,7 +19,7 @@ import numpy as np
 from chilopod import units
 from chilopod.analysis.parameters import numbers_read
 from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, unit_of
-from chilopod.errors import ChilopodError, ParameterError, known_names
+from chilopod.errors import ChilopodError, ParameterError, concerning, known_names
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, finite, tornado
 from chilopod.planar.step_count import steps
@@ -40,8 +40,7 @@ _DERIVED = "body.yaw_inertia"
 @dataclass(frozen=True, eq=False)
 class Effects(ReadOnlyArrays):
     """A quantity of two robots, SI, and the part of each differing number in the difference: alone, as the last change,
-    and in the mean over orders, with half its 95 % interval, zero for all orders; shape (numbers,) each. NaN where a
-    robot in between has no such quantity."""
+    and in the mean over orders, with half its 95 % interval, zero for all orders; shape (numbers,), NaN if none."""
 
     first: float
     second: float
@@ -162,15 +161,10 @@ def compare(
         Seed of the 64 orders that are sampled for ten or more differences.
     remark
         Function that receives a sentence if a quantity will take long.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
     """
     for robot in (first, second):
-        try:
+        with concerning(source=robot.name):
             robot.unit_of(onset.parameter)
-        except ParameterError as error:
-            error.source = robot.name
-            raise
     names, measured = known_names(quantities, QUANTITIES, "quantities"), Measured(onset)
     one, other = _comparable(first, second)
     paths, others = differences(one, other, onset)
@@ -182,8 +176,7 @@ def compare(
 
 
 def differences(first: Robot, second: Robot, onset: Onset) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Paths of differing numbers that the planar model reads, and those of others; without that of the onset where
-    walks are studied at one value of it."""
+    """Paths of differing numbers that the planar model reads, and of others; without that of an onset with a value."""
     resized = first.body.modules != second.body.modules
     alike = first.with_value("body.modules", second.body.modules) if resized else first
     shared = [path for path in second.parameters() if path in alike.parameters() and path != "body.modules"]

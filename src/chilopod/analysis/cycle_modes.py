@@ -104,9 +104,8 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         """Verdict in words, without a derivative on bends of finite size."""
         if self.given_way:
             joint, mean = self.given_way
-            return (
-                f"{self.name}: the straight walk has given way: it bends ({joint} = {self._shown(mean, 2)} in the mean)"
-            )
+            bend = f"{joint} = {self._shown(mean, 2)} in the mean"
+            return f"{self.name}: the straight walk has given way: it bends ({bend})"
         if self.exact:
             return f"{self.name}: the periodic motion is {VERDICTS[self.stable]}"
         size = self._shown(self.amplitude, 3)
@@ -155,8 +154,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
         return [], [head, *rows], [said + contacts, *self._remarks(size)]
 
     def _remarks(self, size: str) -> list[str]:
-        """Sentences about a bent walk, bends of the given size, in words, that differ from the smallest ones, and the
-        heading."""
+        """Sentences about a bent walk, bends of the size, in words, that differ from smallest ones, and the heading."""
         remarks = ["The multipliers are those of the bent walk."] if self.given_way else []
         if not self.finite:
             remarks += [f"With bends of {size} the walk falls, or they grow too far: only smallest ones are shown."]

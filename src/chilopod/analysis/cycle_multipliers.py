@@ -63,14 +63,8 @@ def walk_multipliers(
     twin, also as :class:`chilopod.twin.Edited`; ``amplitude`` and ``cycles`` see :func:`cycle_multipliers`. The
     straight walk has given way if, at the end, a yaw joint bends in the mean over a cycle by more than ``amplitude``
     and by more than any of them swings within the cycle; the multipliers are then those of the walk that follows.
-
-    Raises
-    ------
-    ParameterError
-        If the engine has no cycle map, or that has none of this robot, see :func:`chilopod.twin.walk_cycle`.
-    AnalysisError
-        If the walk falls.
-    """
+    ParameterError if the engine has no cycle map, or that has none of this robot, see
+    :func:`chilopod.twin.walk_cycle`; AnalysisError if the walk falls."""
     known: Any = engine_named(engine) if isinstance(engine, str) else engine
     if not hasattr(known, "walk_cycle"):
         said, allowed = "has no state that can be divided by its place", "twin, or a chilopod.twin.Edited"
@@ -85,6 +79,9 @@ def cycle_multipliers(
 ) -> CycleMultipliers:
     """Leading multipliers of any periodic gait in MuJoCo, near the motion that settles from a start.
 
+    ParameterError if an argument is none of these; AnalysisError if the walk falls before multipliers of smallest bends
+    are known, moves on in a coordinate in every cycle, or depends on its place.
+
     Parameters
     ----------
     name, cycle, start
@@ -92,14 +89,6 @@ def cycle_multipliers(
     bends, amplitude, cycles
         Names of the coordinates by which modes are scaled and named, size of finite bends in their unit, and the
         number of cycles that they are followed, at least 12.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is none of these.
-    AnalysisError
-        If the walk falls before multipliers of smallest bends are known, moves on in a coordinate in every cycle, or
-        depends on its place.
     """
     return _found(name, cycle, start, bends, amplitude, cycles, straight=False)
 
@@ -155,11 +144,9 @@ def finite_modes(
     cycles: int = 20,
     basis: tuple[Array, Array] | None = None,
 ) -> tuple[tuple[CycleMode, ...], Array, tuple[Array, Array]]:
-    """Leading modes of bends of a given size alone, by falling modulus, :func:`cycle_multipliers` at half its cost.
-
-    The arguments are the same, and ``basis``, leading modes (n, r) and their dual (r, n) of a similar walk that has
-    settled at ``start``. Returns the modes, with errors by scatter alone, the settled state, (n,), and the basis.
-    """
+    """Leading modes of bends of a given size alone, by falling modulus, :func:`cycle_multipliers` at half its cost. The
+    arguments are the same, and ``basis``, leading modes (n, r) and their dual (r, n) of a similar walk that has settled
+    at ``start``. Returns the modes, with errors by scatter alone, the settled state, (n,), and the basis."""
     at, x = _indices(cycle, bends), start
     for _ in range(_SETTLING if basis is None else _FORGOTTEN * _BLOCK):
         x = cycle(x[None])[0][0]
@@ -235,8 +222,7 @@ def _switched(cycle: CycleMap, x: Array, basis: Array, step: float) -> Array:
 
 
 def _leading(derivative: Array, at: _Indices) -> tuple[Array, Array]:
-    """Real basis of the leading modes, (n, r), and its dual. The largest bend of a mode is 1, or, if it has none, its
-    largest entry."""
+    """Real basis of the leading modes, (n, r), of which the largest bend, or without one entry, is 1; and its dual."""
     # Left eigenvectors of their own: the inverse of the right ones is lost if any mode at all is defective.
     values, left, right = eig(derivative, left=True)
     order = falling(values)
@@ -375,10 +361,8 @@ def bend_onset(
 
     (a, b), (at_a, at_b) = between, [excess(end)[0] for end in between]
     if at_a * at_b > 0.0:
-        ends = [
-            f"the multiplier {1.0 + at:.4f}" if math.isfinite(at) else "a walk that has given way"
-            for at in (at_a, at_b)
-        ]
+        gone = "a walk that has given way"
+        ends = [f"the multiplier {1.0 + at:.4f}" if math.isfinite(at) else gone for at in (at_a, at_b)]
         said = f"must hold an onset; its ends have {ends[0]} and {ends[1]}"
         given = f"{shown(a)} to {shown(b)}"
         raise ParameterError(said, field="onset", value=given, allowed="values on both sides of 1")

@@ -26,11 +26,9 @@ def derivative(
     function: Callable[[float], Array], at: float, size: float, round_off: float = ROUND_OFF
 ) -> tuple[Array, Array]:
     """Derivative of a function of one number at a place, and its error; both have the shape of the function's values.
-
     The ``size`` of the number sets the steps; ``round_off`` is the error of a value, relative to the values. Where the
     function raises a ParameterError on one side, as at the end of a range, the derivative is that towards the other
-    side. AnalysisError if it cannot be evaluated on both sides.
-    """
+    side. AnalysisError if it cannot be evaluated on both sides."""
     steps = _STEP * size * 0.5 ** np.arange(_LEVELS)
     here = np.asarray(function(at), dtype=np.float64)
     sides: list[Array] = []

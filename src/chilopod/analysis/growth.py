@@ -7,7 +7,7 @@ import math
 from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from chilopod import stability
 from chilopod.cores import cores
 from chilopod.errors import ChilopodError
-from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray
 from chilopod.labels import Labelled
 from chilopod.planar import PlanarModel
 from chilopod.planar.many import return_maps, shape
@@ -44,24 +44,11 @@ NEAR = "bound where a multiplier lies within 1e-4 of the unit circle; elsewhere 
 _FAILED = np.array([np.nan, np.nan, np.nan, -1, FATES.index(Fate.FAILED)])  # column of a computation that failed
 
 
-@dataclass(frozen=True, eq=False)
-class Growth(ReadOnlyArrays):
-    """Leading disturbance of the straight walks of many robots, all of shape (robots,).
-
-    Attributes
-    ----------
-    growth
-        Growth rate, 1/s, negative if it dies out; NaN if the robot is invalid or the computation failed.
-    frequency
-        Angular frequency, rad/s: principal value over the period of the gait; 0 for a bend.
-    error
-        Bound on the error of the growth rate, 1/s, where the multiplier lies within 1e-4 of the unit circle; elsewhere
-        NaN, and the sign is certain.
-    unstable
-        Number of multipliers outside the unit circle; -1 if invalid or failed.
-    fate
-        Index into :data:`FATES`.
-    """
+class Growth(NamedTuple):
+    """Leading disturbance of the straight walks of many robots, shape (robots,): growth rate, 1/s, negative if it dies
+    out, NaN if the robot is invalid or the computation failed; angular frequency, rad/s, principal value over the
+    period of the gait, 0 for a bend; bound on the error of the growth rate, 1/s, a :data:`NEAR`; number of multipliers
+    outside the unit circle, -1 if invalid or failed; and index into :data:`FATES`."""
 
     growth: Array
     frequency: Array
@@ -71,15 +58,8 @@ class Growth(ReadOnlyArrays):
 
 
 def growth_rates(robots: Iterable[Robot | ChilopodError], count: int, progress: Progress = silent) -> Growth:
-    """Growth of the leading disturbance of every robot, in batches on all cores.
-
-    Parameters
-    ----------
-    robots, count
-        Robots, or the error that says why there is none; and their number. They are taken as they are needed.
-    progress
-        Function that receives the progress.
-    """
+    """Growth of the leading disturbance of every robot, in batches on all cores. Robots, or the error that says why
+    there is none, are taken as they are needed; ``count`` is their number."""
     found: list[Array] = []
     given, waiting = iter(robots), deque[Future[Array]]()
     batches = iter(lambda: list(itertools.islice(given, _BATCH)), [])

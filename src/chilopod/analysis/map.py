@@ -61,12 +61,12 @@ def map(
 
     A coarse grid of growth rates is refined where neighbours differ in what becomes of a disturbance. Where they differ
     in the number of unstable multipliers, the bifurcation between them is located, and continued as a curve through the
-    plane; cells on curves are refined, and the search repeats until every difference is on a curve.
+    plane; cells on curves are refined, and the search repeats until every difference is on a curve. ParameterError if
+    an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if the map
+    would take too long.
 
     Parameters
     ----------
-    robot
-        Robot.
     x, y
         Path of a number, such as ``legs.forward_offset``, ``springs.stiffness[0]`` or, for a group,
         ``springs.stiffness[1:]``; or ``speed``, at the same stride and duty factor, or ``modules``, of the same length
@@ -83,14 +83,6 @@ def map(
         True if that file may be replaced although it is damaged or belongs to another map.
     remark
         Function that receives a sentence if the map will take long.
-    progress
-        Function that receives the progress.
-
-    Raises
-    ------
-    ParameterError
-        If an axis is not one, its range is reversed, empty or fractional for modules, or both change one number; if the
-        map would take too long.
     """
     plane = Plane.over(robot, x, y)
     if not 2 <= points <= _MOST_POINTS:
@@ -147,8 +139,7 @@ def _failed(grid: Grid) -> list[str]:
 
 
 def _announce(grid: Grid, remark: Callable[[str], None], points: int, kept: bool) -> None:
-    """Say how long a long map will take, from robots in the middles of nine equal parts; refuse one of many hours whose
-    growth rates are not kept."""
+    """Say how long a long map takes, by robots in the middles of nine parts; refuse many hours that are not kept."""
     y, x = (values[np.array([1, 3, 5]) * values.size // 6] for values in (grid.y, grid.x))
     places = grid.robots(np.tile(x, 3).tolist(), np.repeat(y, 3).tolist())
     robots = [robot for robot in places if isinstance(robot, Robot)]
@@ -223,9 +214,8 @@ def _radii(grid: Grid, wanted: bool, progress: Progress) -> tuple[Array, list[st
         apart[at] = _ALONE if alone and seeds[at] is None else np.inf  # it is tried again beside a known one
     missing = np.flatnonzero(np.isnan(found[*nodes.T]))
     why = [next((each for each in (TOO_BENT, NO_PAIR) if each in reasons[at]), "") for at in missing]
-    said = [
-        f"at {why.count(each)} of {len(nodes)} values {each}: no radius" for each in (TOO_BENT, NO_PAIR) if each in why
-    ]
+    known = [each for each in (TOO_BENT, NO_PAIR) if each in why]
+    said = [f"at {why.count(each)} of {len(nodes)} values {each}: no radius" for each in known]
     return found, [*said, *[f"{why.count('')} of {len(nodes)} radii are not found"] * ("" in why)]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from chilopod import units
 from chilopod.analysis.parameters import check_parameter
-from chilopod.errors import ChilopodError, ParameterError, nearest_name
+from chilopod.errors import ChilopodError, ParameterError, concerning, nearest_name
 from chilopod.frozen import Array
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
@@ -106,7 +106,7 @@ def axis(robot: Robot, given: Given, field: str) -> Axis:
         error.allowed = error.allowed and ", ".join((error.allowed, *DERIVED))
         error.field, error.value = f"{field} {path}", path
         raise
-    try:
+    with concerning(f"{field} {path}"):
         low, high = (units.parse(end, si) if isinstance(end, str) else float(end) for end in ends)
         # Axes and files are in the unit in which the range was given.
         found = Axis(path, low, high, units.unit_in(str(ends[1])) or unit, si)
@@ -114,10 +114,7 @@ def axis(robot: Robot, given: Given, field: str) -> Axis:
             raise ParameterError("must rise from a lower to a higher value", value=" ".join(map(str, ends)))
         if found.whole and not (low.is_integer() and high.is_integer()):
             raise ParameterError("must be whole numbers of modules", value=" ".join(map(str, ends)))
-    except ChilopodError as error:
-        error.field = f"{field} {path}"
-        raise
-    return found
+        return found
 
 
 @dataclass(frozen=True)

@@ -42,8 +42,7 @@ _CUT_OFF = {Ending.LOST, Ending.BUDGET, Ending.ENOUGH_POINTS}
 
 @dataclass(frozen=True, eq=False)
 class MapPoint(ReadOnlyArrays):
-    """A point where two conditions hold at once, such as the meeting of two curves: kind, values of both numbers in SI
-    units and bounds on their errors, shape (2,)."""
+    """A point where two conditions hold at once: kind, values of both numbers, SI, and error bounds, shape (2,)."""
 
     kind: CodimensionTwo
     values: Array
@@ -52,20 +51,11 @@ class MapPoint(ReadOnlyArrays):
 
 @dataclass(frozen=True, eq=False)
 class MapCurve(ReadOnlyArrays):
-    """Bifurcation points of the straight walk, or folds of the curved walks.
-
-    Attributes
-    ----------
-    kind, special
-        Kind of the bifurcation, and points of codimension two on the curve.
-    values, error_bound
-        Values of both numbers in SI units, and bounds on their errors, shape (points, 2).
-    coefficient
-        Cubic coefficient of the normal form for an amplitude of joint angles, 1/rad^2, negative where it is
-        supercritical, shape (points,). NaN where it is not known, and of transcritical points, which have none.
-    line
-        True if the points follow each other on a curve, False if each belongs to a number of modules.
-    """
+    """Bifurcation points of the straight walk, or folds of the curved walks: ``values`` of both numbers, SI, and bounds
+    on their errors, shape (points, 2), which follow each other on a ``line``, or each belong to a number of modules;
+    with ``special`` points of codimension two on the curve. ``coefficient`` is the cubic one of the normal form for an
+    amplitude of joint angles, 1/rad^2, negative where it is supercritical, shape (points,). NaN where it is not known,
+    and of transcritical points, which have none."""
 
     kind: Kind
     values: Array
@@ -92,13 +82,8 @@ class Edge:
 
 @dataclass
 class Search:
-    """Search for the curves of a map.
-
-    Attributes
-    ----------
-    curves, remarks, lost
-        Curves found so far; sentences about those that may be missing; numbers of pitchforks without their folds.
-    """
+    """Search for the curves of a map: those found so far, sentences about those that may be missing, and numbers of
+    pitchforks whose folds are ``lost``."""
 
     plane: Plane
     grid: Grid
@@ -254,9 +239,8 @@ class Search:
                 for fold in self._fold(edge, middle, p, q, len(subcritical)):
                     self._add(follow2(loose, fold, second=q, **few), edge)
         except ChilopodError as error:
-            self.remarks.append(
-                f"a curve that begins at a {point.kind.label} is not followed to its end: {error.problem}"
-            )
+            begun = f"a curve that begins at a {point.kind.label}"
+            self.remarks.append(f"{begun} is not followed to its end: {error.problem}")
 
     def _add(self, curve: Curve2, edge: Edge, *begin: Any) -> None:
         """Keep a curve in the order of the map's axes, from where it begins, and say where it ends before it should."""

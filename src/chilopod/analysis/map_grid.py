@@ -25,18 +25,10 @@ _AT_ONCE = 20_000  # nodes between two savings
 
 
 class Grid:
-    """Nodes of the finest grid, of which those are computed whose cell is not uniform.
-
-    Attributes
-    ----------
-    x, y
-        SI values, shape (columns,) and (rows,).
-    values
-        Growth, frequency, error, unstable and fate as of :class:`chilopod.analysis.growth.Growth`, shape (5, rows,
-        columns); in uniform cells growth and frequency between the corners are interpolated.
-    computed
-        True at computed nodes, shape (rows, columns).
-    """
+    """Nodes of the finest grid at SI values ``x``, shape (columns,), and ``y``, shape (rows,), of which those are
+    ``computed``, shape (rows, columns), whose cell is not uniform. ``values`` are growth, frequency, error, unstable
+    and fate as of :class:`chilopod.analysis.growth.Growth`, shape (5, rows, columns); in uniform cells growth and
+    frequency between the corners are interpolated."""
 
     def __init__(self, plane: Plane, points: int, keep: Callable[[Grid], None] = lambda grid: None) -> None:
         self.plane, self.keep = plane, keep
@@ -59,8 +51,7 @@ class Grid:
             j, i = rows[first : first + _AT_ONCE], columns[first : first + _AT_ONCE]
             robots = self.robots(self.x[i].tolist(), self.y[j].tolist())
             shown = part(progress, first / rows.size, min(1.0, (first + _AT_ONCE) / rows.size))
-            found = growth_rates(robots, j.size, shown)
-            self.values[:, j, i] = found.growth, found.frequency, found.error, found.unstable, found.fate
+            self.values[:, j, i] = growth_rates(robots, j.size, shown)
             self.computed[j, i] = True
             if rows.size > 1:
                 self.keep(self)

@@ -83,11 +83,8 @@ class StabilityMap(Summary, ReadOnlyArrays):
     @cached_property
     def folded(self) -> Array:
         """1 where curved walks exist beside a stable straight one, else 0, shape (rows, columns). NaN where it is not
-        known: for 0 if not all folds are known, and in parts that no pitchfork and no fold bounds.
-
-        Folds cut the values with a stable straight walk into parts. Curved walks exist in a part that begins at a
-        subcritical pitchfork and ends at a fold.
-        """
+        known: for 0 if not all folds are known, and in parts that no pitchfork and no fold bounds. Folds cut the values
+        with a stable straight walk into parts. Curved walks exist in one from a subcritical pitchfork to a fold."""
         straight = self.fate == FATES.index(Fate.STRAIGHT)
         joined = np.zeros([2 * count - 1 for count in straight.shape], dtype=bool)  # values, and links between them
         joined[::2, ::2] = straight
@@ -140,16 +137,9 @@ class StabilityMap(Summary, ReadOnlyArrays):
         return above, table if self.special else [], list(self.remarks)
 
     def plot(self, axes: Axes | None = None, show: str = "kind") -> Axes:
-        """Draw the map on axes of matplotlib or on new ones.
-
-        Parameters
-        ----------
-        axes
-            Axes to draw on.
-        show
-            ``kind``: what becomes of a disturbance; ``growth``: growth rate; ``frequency``: frequency of undulations;
-            ``radius``: radius of the curved walks; ``criticality``: coefficient of the normal form along the curves.
-        """
+        """Draw the map on axes of matplotlib or on new ones, and ``show`` in colours the ``kind``, what becomes of a
+        disturbance, its ``growth`` rate, the ``frequency`` of undulations, the ``radius`` of the curved walks, or the
+        ``criticality``, the coefficient of the normal form along the curves."""
         from chilopod.analysis.map_picture import draw, keys
 
         axes = draw(self, axes, show)
@@ -180,8 +170,7 @@ class StabilityMap(Summary, ReadOnlyArrays):
         }
 
     def to_dataset(self) -> xr.Dataset:
-        """Dataset of the grid over (y, x), in the units of the axes and of the attributes, and of the curves over
-        ``point``, with the number of the curve."""
+        """Dataset of the grid over (y, x), in the units of axes and attributes, and of the curves over ``point``."""
         grid = ("y", "x")
         meanings = ", ".join(f"{index}: {fate.label}" for index, fate in enumerate(FATES))
         found: dict[str, Any] = {
@@ -226,8 +215,7 @@ def _between(curves: Sequence[MapCurve], axis: int, values: Array, others: Array
 
 
 def _crossed(curves: Sequence[MapCurve], kind: Kind, axis: int, value: float) -> tuple[Array, Array]:
-    """Places along an axis where curves of a kind have a value of the other number, in SI units, and the coefficients
-    there, 0 where these are not known."""
+    """Places along an axis where curves of a kind have a value of the other number, SI; coefficients, 0 if unknown."""
     places, coefficients = [np.empty(0)], [np.empty(0)]
     for curve in curves:
         if curve.kind is kind:

@@ -25,12 +25,9 @@ def stiffness(value: float) -> float:
 
 
 def spring_scale(robot: Robot) -> float:
-    """Scale of a robot's springs, friction x speed x duty factor x module length, N*m/rad.
-
-    Critical springs of robots of one shape are about the same in this unit, whatever their size, mass, speed and floor.
-    Exactly, they also depend on mass / (friction x period): they hardly do while the feet stop a module within a
-    step.
-    """
+    """Scale of a robot's springs, friction x speed x duty factor x module length, N*m/rad. Critical springs of robots
+    of one shape are about the same in this unit, whatever their size, mass, speed and floor. They also depend on mass /
+    (friction x period), but hardly while the feet stop a module within a step."""
     gait = robot.gait
     return robot.ground.friction * gait.speed * gait.duty * robot.module_length
 
@@ -50,10 +47,8 @@ def numbers_read(robot: Robot) -> tuple[str, ...]:
 
 
 def check_parameter(robot: Robot, parameter: str) -> None:
-    """Refuse, with a ParameterError, anything but the path of a continuous number that the planar model reads.
-
-    Numbers of the twin are read where they set the yaw inertia of a module.
-    """
+    """Refuse, with a ParameterError, anything but the path of a continuous number that the planar model reads; of the
+    twin it reads those that set the yaw inertia of a module."""
     read = _read(robot)
     try:
         robot.unit_of(parameter)

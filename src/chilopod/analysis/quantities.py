@@ -98,11 +98,9 @@ def leading_mode(robot: Robot, symmetric: bool = True) -> Mode:
 class Onset:
     """The number at whose critical value the straight walk loses stability, to a bend or an undulation, the interval in
     which that is searched, of springs by default that of :func:`chilopod.analysis.parameters.searched_springs`, and the
-    value at which straight and curved walks are studied, by default that of each robot; SI.
-
-    Most robots bend as a spring falls. Where the straight walk is unstable at the upper end of the interval and stable
-    at the lower one, the robot bends as the number rises.
-    """
+    value at which straight and curved walks are studied, by default that of each robot; SI. Most robots bend as a
+    spring falls. Where the straight walk is unstable at the upper end of the interval and stable at the lower one, the
+    robot bends as the number rises."""
 
     parameter: str = K1
     between: tuple[float, float] | None = None
@@ -167,20 +165,11 @@ class Onset:
 
 
 class Measured:
-    """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before,
-    but onsets are searched in the whole interval if not ``similar``.
-
-    Each of :data:`QUANTITIES` is a method of a robot, and raises AnalysisError where the robot has no such quantity.
-
-    Attributes
-    ----------
-    number
-        Number that bends the robots.
-    branches
-        Number of branches of curved walks that were followed so far, which take a second or more each.
-    near
-        State of the curved walk from which the next is corrected, and inverse of the slope of what it lacks.
-    """
+    """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before, but
+    onsets are searched in the whole interval if not ``similar``. Each of :data:`QUANTITIES` is a method of a robot, and
+    raises AnalysisError where the robot has no such quantity. ``number`` is that which bends the robots, ``branches``
+    counts those that were followed so far, which take a second or more each, and ``near`` is the state of the curved
+    walk from which the next is corrected, and the inverse of the slope of what it lacks."""
 
     def __init__(self, number: Onset, similar: bool = True, following: Callable[[], None] = lambda: None) -> None:
         """The number, whether robots are similar, and a function that is called before a branch is followed."""

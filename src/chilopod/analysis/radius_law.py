@@ -45,17 +45,10 @@ class RadiusLaws(Short):
 
 def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     """Compute the laws from the branch of curved walks, from the pitchfork down to a bend of a right angle in a joint.
-
-    Raises
-    ------
-    AnalysisError
-        If the straight walk has no pitchfork in the first spring, or the curved walks beside it give no law.
-    """
+    AnalysisError if the straight walk has no pitchfork in the first spring, or walks beside it give no law."""
     stiffest = max(robot.springs.stiffness)
     low, high = (part * stiffest for part in _BETWEEN)
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress)
-    axis, path = (
-        RadiusLaw.of_branch(walks.parameter_si.values, walks[name].values, walks.stable.values, robot.unit_of(K1))
-        for name in ("axis_radius", "path_radius")
-    )
+    springs, stable, radii = walks.parameter_si.values, walks.stable.values, (walks.axis_radius, walks.path_radius)
+    axis, path = (RadiusLaw.of_branch(springs, each.values, stable, robot.unit_of(K1)) for each in radii)
     return RadiusLaws(axis, path, walks)

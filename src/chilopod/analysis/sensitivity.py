@@ -34,6 +34,7 @@ DEFAULT = ("onset", "growth", "frequency")
 """Quantities that take little time."""
 
 _RELATIVE = "onset", "radius"  # shown in % per %; the others may be near zero
+_UNEVEN = "gait.side_phase"  # other values of it end the symmetry of half a period
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +68,7 @@ class Sensitivity(Summary, ReadOnlyArrays):
         return dict(zip(self.paths, self.derivatives[self._row(quantity)].tolist(), strict=True))
 
     def percent(self, quantity: str) -> dict[str, float]:
-        """Change of one quantity by 1 % of each number, by its path: in % of onset and radius, else in the unit of the
-        quantity; 0 for a number that is zero."""
+        """Change of one quantity by 1 % of each number, by path: in % of onset and radius, else in its unit."""
         return dict(zip(self.paths, self._percent(self._row(quantity)).tolist(), strict=True))
 
     def _percent(self, row: int) -> Array:
@@ -78,9 +78,6 @@ class Sensitivity(Summary, ReadOnlyArrays):
     def _row(self, quantity: str) -> int:
         known_names([quantity], self.quantities, "quantity", "is not computed")
         return self.quantities.index(quantity)
-
-    def _unit(self, quantity: str) -> str:
-        return unit_of(quantity, self.robot, self.onset)
 
     def as_json(self) -> dict[str, Any]:
         """Values, derivatives and errors as plain numbers, SI, and the changes by 1 % of every number."""
@@ -130,8 +127,9 @@ class Sensitivity(Summary, ReadOnlyArrays):
 
     def _slope_in_words(self, row: int, at: int) -> str:
         name, unit = self.quantities[row], self.robot.unit_of(self.paths[at])
-        slope = units.from_si(self.derivatives[row, at], self._unit(name)) / units.from_si(1.0, unit)
-        return f"{name} changes by {f'{slope:+.4g} {self._unit(name)}'.strip()} for 1 {unit}"
+        own = unit_of(name, self.robot, self.onset)
+        slope = units.from_si(self.derivatives[row, at], own) / units.from_si(1.0, unit)
+        return f"{name} changes by {f'{slope:+.4g} {own}'.strip()} for 1 {unit}"
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the changes of the first quantity by 1 % of each number, largest on top."""
@@ -154,7 +152,8 @@ def sensitivity(
     paths: Sequence[str] | None = None,
     progress: Progress = silent,
 ) -> Sensitivity:
-    """Derivatives of quantities with respect to numbers of a robot.
+    """Derivatives of quantities with respect to numbers of a robot. AnalysisError if a quantity does not exist, as the
+    radius of a robot that walks straight; ParameterError if a quantity or a number is not known.
 
     Parameters
     ----------
@@ -165,15 +164,6 @@ def sensitivity(
         radius a branch of curved walks.
     paths
         Numbers, by default all that the planar model reads.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
-
-    Raises
-    ------
-    AnalysisError
-        If a quantity does not exist, as the radius of a robot that walks straight.
-    ParameterError
-        If a quantity or a number is not known.
     """
     wanted = known_names(quantities, QUANTITIES, "quantities")
     robot = onset.there(robot)
@@ -202,10 +192,8 @@ _Row = tuple[float, list[float], list[float]]
 
 def size_of(robot: Robot, path: str) -> float:
     """Size of a number for steps, SI: its own, or a typical one if it is zero."""
-    typical = {
-        "springs.damping": max(robot.springs.stiffness) * robot.gait.period,
-        "legs.forward_offset": robot.module_length,
-    }
+    damping = max(robot.springs.stiffness) * robot.gait.period
+    typical = {"springs.damping": damping, "legs.forward_offset": robot.module_length}
     return abs(robot.get(path)) or typical.get(path.partition("[")[0], 1.0)
 
 
@@ -235,11 +223,6 @@ class _Leading:
         return slope, float(np.hypot(errors[0], errors[1]) + abs(exponent) * errors[2]) / mode.duration
 
 
-def _keeps_symmetry(path: str) -> bool:
-    """True if a gait with another value keeps the symmetry of half a period."""
-    return path != "gait.side_phase"
-
-
 def _by_each(
     what: str, paths: Sequence[str], show: Progress, slope: Callable[[str], tuple[Any, Any]]
 ) -> tuple[list[Any], list[Any]]:
@@ -258,7 +241,7 @@ def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> 
     def slope(path: str) -> tuple[float, float]:
         if onset.parameter in (path, path.partition("[")[0]):
             return 0.0, 0.0  # it is replaced
-        symmetric = _keeps_symmetry(path)
+        symmetric = path != _UNEVEN
         (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, symmetric), of.slope(path, symmetric)
         found = -by_path.real / by_onset.real
         return found, (off + abs(found) * uncertain) / abs(by_onset.real)
@@ -269,12 +252,11 @@ def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> 
 def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
     of = _Leading(robot)
     mode: Mode = of.mode(True)
-    slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, _keeps_symmetry(path)))
+    slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, path != _UNEVEN))
     turns = mode.frequency > 0.0
-    return {
-        "growth": (mode.growth, [slope.real for slope in slopes], errors),
-        "frequency": (mode.frequency, [turns * slope.imag for slope in slopes], [turns * error for error in errors]),
-    }
+    turning = [turns * slope.imag for slope in slopes], [turns * error for error in errors]
+    growth = mode.growth, [slope.real for slope in slopes], errors
+    return {"growth": growth, "frequency": (mode.frequency, *turning)}
 
 
 def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:

@@ -53,22 +53,10 @@ class SquareRootFit:
 
 
 def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
-    """Fit the square-root law to trials by least squares in the angle.
-
-    Parameters
-    ----------
-    inverse, angle
-        1/k of every trial, positive, equal for trials at one spring, and their mean angles, whose sign is ignored,
-        shape (trials,).
-
-    Raises
-    ------
-    ParameterError
-        If the arrays differ in shape or are not finite.
-    AnalysisError
-        If the trials do not determine the point: fewer than three, at fewer than two springs that bend, or with angles
-        that do not fall towards it.
-    """
+    """Fit the square-root law to trials by least squares in the angle: 1/k of every trial, positive, equal for trials
+    at one spring, and their mean angles, whose sign is ignored, shape (trials,). ParameterError if the arrays differ in
+    shape or are not finite; AnalysisError if the trials do not determine the point: fewer than three, at fewer than two
+    springs that bend, or with angles that do not fall towards it."""
     x, y = np.asarray(inverse, dtype=np.float64), np.abs(np.asarray(angle, dtype=np.float64))
     if x.ndim != 1 or x.shape != y.shape:
         raise ParameterError("must have one value for each spring", field="angle", value=y.shape, allowed=f"{x.shape}")
@@ -84,12 +72,8 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
     best = int(_lost(basis, y[:, None])[:, 0].argmin())
     if best in (0, len(grid) - 1):
         raise AnalysisError("must fall to zero as a square root of the distance to the pitchfork", field="angle")
-    found = minimize_scalar(
-        lambda at: _lost(_root(x, at)[None], y[:, None])[0, 0],
-        bounds=(grid[best + 1], grid[best - 1]),
-        method="bounded",
-        options={"xatol": 1e-13 * grid[best]},
-    )
+    how = {"bounds": (grid[best + 1], grid[best - 1]), "options": {"xatol": 1e-13 * grid[best]}}
+    found = minimize_scalar(lambda at: _lost(_root(x, at)[None], y[:, None])[0, 0], method="bounded", **how)
     at = float(found.x)
     root = _root(x, at)
     amplitude = float(root @ y / (root @ root))
@@ -101,14 +85,8 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike) -> SquareRootFit:
     inverted = np.linalg.inv(slopes.T @ slopes)
     effects = np.zeros(x.size)  # of every trial on 1/kc
     effects[beyond] = inverted[1] @ slopes.T
-    return SquareRootFit(
-        critical=1.0 / at,
-        error=float(np.sqrt(spread * inverted[1, 1])) / at**2,
-        estimate=_estimate(x, y, at, effects),
-        amplitude=amplitude,
-        residual=float(np.sqrt(np.mean(residuals**2))),
-        trials=x.size,
-    )
+    error, residual = float(np.sqrt(spread * inverted[1, 1])) / at**2, float(np.sqrt(np.mean(residuals**2)))
+    return SquareRootFit(1.0 / at, error, _estimate(x, y, at, effects), amplitude, residual, trials=x.size)
 
 
 def _root(inverse: Array, critical: ArrayLike) -> Array:

@@ -67,6 +67,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
         """The result as plain numbers; complex ones as [real, imaginary]."""
         multipliers = self.exponents.multipliers
         half = multipliers.half_period
+        modes = zip(_pairs(self.exponents.values), self.joint_components, strict=True)
         return {
             "robot": self.robot.name,
             "period_s": self.robot.gait.period,
@@ -76,10 +77,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
             "multipliers": _pairs(multipliers.values),
             "half_period_multipliers": None if half is None else _pairs(half),
             "error_estimate": multipliers.error_bound,
-            "modes": [
-                {"exponent": exponent, "joint_components": _numbers(components)}
-                for exponent, components in zip(_pairs(self.exponents.values), self.joint_components, strict=True)
-            ],
+            "modes": [{"exponent": exponent, "joint_components": _numbers(each)} for exponent, each in modes],
         }
 
     @property
@@ -90,9 +88,8 @@ class StraightWalk(Summary, ReadOnlyArrays):
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         rows: list[Sequence[str]] = [("|multiplier|", "exponent (1/s)", "joint angles of the mode, front to rear")]
-        for modulus, exponent, components in zip(
-            self.moduli, self.exponents.values, self.joint_components, strict=True
-        ):
+        modes = zip(self.moduli, self.exponents.values, self.joint_components, strict=True)
+        for modulus, exponent, components in modes:
             rows.append((f"{modulus:.6g}", _in_words(exponent, 6), "  ".join(map(_in_words, components))))
         nearer = "; the largest is nearer to 1 than that" if self.stable is None else ""
         said = [f"multipliers are within {self.exponents.multipliers.error_bound:.1e}{nearer}"]
@@ -185,13 +182,8 @@ class WalkBifurcation(Summary, ReadOnlyArrays):
 
 
 def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
-    """Floquet analysis of the straight walk in the planar model.
-
-    Raises
-    ------
-    AnalysisError
-        If the expected time exceeds ``longest`` (s), as for a hundred modules or very light ones.
-    """
+    """Floquet analysis of the straight walk in the planar model; AnalysisError if the expected time exceeds ``longest``
+    (s), as for a hundred modules or very light ones."""
     model = PlanarModel(robot)
     # The period is cut into parts that contract by a factor of 1e6 at most, and matrices of this size are split along
     # them: this estimates the time within a factor of two on a present desktop.
@@ -201,10 +193,8 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
     parts = max(_FEWEST_PARTS, 0.5 * contraction / math.log(1e6))
     seconds = _A_PART * parts * model.dimension**2.5
     if seconds > longest:
-        problem = (
-            f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
-            f"out {contraction:.3g} e-folds a period or more"
-        )
+        fastest = f"the fastest of which dies out {contraction:.3g} e-folds a period or more"
+        problem = f"the exponents would take about {_duration(seconds)}: {model.dimension} states, {fastest}"
         allowed = f"about {_duration(longest)}: fewer modules, or longer and heavier ones"
         raise AnalysisError(problem, field="body.modules", value=robot.body.modules, allowed=allowed)
     found = stability.exponents(model, resolved=True)
@@ -219,13 +209,8 @@ def _duration(seconds: float) -> str:
 
 
 def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
-    """The planar model as a function of one parameter in SI units.
-
-    Raises
-    ------
-    ParameterError
-        If the parameter does not vary continuously, or the planar model does not read it.
-    """
+    """The planar model as a function of one parameter in SI units; ParameterError if that does not vary continuously,
+    or the planar model does not read it."""
     check_parameter(robot, parameter)
     # Where the symmetry of the gait itself changes, only the full period means the same on both sides.
     symmetric = parameter != "gait.side_phase"
@@ -240,7 +225,8 @@ def bifurcations(
     remark: Callable[[str], None] = lambda sentence: None,
     seconds: float = math.inf,
 ) -> list[WalkBifurcation]:
-    """Every bifurcation of the straight walk in an interval of a parameter.
+    """Every bifurcation of the straight walk in an interval of a parameter, by rising parameter; none if stability does
+    not change.
 
     Parameters
     ----------
@@ -255,10 +241,6 @@ def bifurcations(
     seconds
         Time after which the search ends with the points found so far; motion far from a robot's scales may be slow to
         follow.
-
-    Returns
-    -------
-    Points by rising parameter; empty if stability does not change.
     """
     make = family(robot, parameter)
     unit = robot.unit_of(parameter)
@@ -285,14 +267,8 @@ def first_loss(
     robot: Robot, parameter: str, between: tuple[float, float] | None, kind: Kind | None, normal_form: bool = True
 ) -> WalkBifurcation:
     """Bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down; None is
-    the interval of :func:`chilopod.analysis.parameters.searched_springs`.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no bifurcation, it is of another kind (None is any kind), or the straight walk at ``between[1]`` is
-        not known to be stable.
-    """
+    the interval of :func:`chilopod.analysis.parameters.searched_springs`. AnalysisError if there is none, it is of
+    another kind (None is any kind), or the straight walk at ``between[1]`` is not known to be stable."""
     what, between = "loss of stability" if kind is None else kind.label, between or searched_springs(robot)
     spaced = np.geomspace if between[0] > 0.0 else np.linspace
     for low in spaced(between[1], between[0], 5)[1:]:
@@ -320,24 +296,18 @@ def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) ->
 
 
 def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:
-    """Pitchfork at which the straight walk loses stability as k1 is softened, see :func:`first_loss`; searched at all
-    springs that may be critical."""
+    """Pitchfork at which the straight walk ends as k1 is softened, of all possible springs, see :func:`first_loss`."""
     return first_loss(robot, K1, None, Kind.PITCHFORK, normal_form)
 
 
 def joint_components(mode: ComplexArray, modules: int) -> ComplexArray:
-    """Joint angles of a mode, of unit norm.
-
-    The phase is free: the largest component is made real and positive, except that where all components of a real mode
-    have one sign, that is positive.
-    """
+    """Joint angles of a mode, of unit norm; the phase is free, and the largest component is made real and positive."""
     part = mode[_joints(modules)]
     peak = part[np.abs(part).argmax()]
     norm = np.linalg.norm(part)
     if norm == 0.0:
         return part
-    unit: ComplexArray = part / norm * (np.abs(peak) / peak)
-    return unit
+    return np.asarray(part / norm * (np.abs(peak) / peak))
 
 
 def _joints(modules: int) -> slice:

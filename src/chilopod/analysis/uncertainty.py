@@ -195,7 +195,8 @@ def uncertainty(
     seed: int = 0,
     progress: Progress = silent,
 ) -> Uncertainty:
-    """Spread of the onset for numbers within tolerances.
+    """Spread of the onset for numbers within tolerances. AnalysisError if the robot itself has no onset; ParameterError
+    if a number with its tolerance is out of range, such as a negative mass.
 
     Parameters
     ----------
@@ -206,15 +207,6 @@ def uncertainty(
     samples, seed
         Number of samples, a power of two to 65536 (numbers + 2 evaluations of a few ms for each, of half a second for
         robots with extreme numbers), and seed of their scrambling.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
-
-    Raises
-    ------
-    AnalysisError
-        If the robot itself has no onset.
-    ParameterError
-        If a number with its tolerance is out of range, such as a negative mass.
     """
     _check(robot, tolerances, onset, samples)
     paths, widths = tuple(tolerances), np.array([*tolerances.values()], dtype=np.float64)

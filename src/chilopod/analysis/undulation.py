@@ -41,12 +41,13 @@ _LONGEST = 100_000  # periods until all have settled
 def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progress: Progress = silent) -> xr.Dataset:
     """Amplitude and frequency of the settled undulation below the Neimark-Sacker point of uniform springs.
 
+    AnalysisError if there is no Neimark-Sacker point, if it is not supercritical, so that no small undulation exists,
+    or if a motion diverges; ParameterError if a distance is not between 0 and 1.
+
     Parameters
     ----------
     robot, distances
         Robot, whose springs do not matter; 1 - k/k* of the springs, each above 0 and below 1.
-    progress
-        Function that receives the progress.
 
     Returns
     -------
@@ -55,14 +56,6 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     ``predicted_amplitude`` and ``predicted_frequency``; ``linear_frequency``, that of a small undulation;
     ``largest_angle`` of any joint (rad); and ``swing`` over (distance, joint), the measured share of every joint at
     the second frequency (rad). ``component`` over joint has unit norm. The point is in the attributes.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no Neimark-Sacker point, if it is not supercritical, so that no small undulation exists, or if a
-        motion diverges.
-    ParameterError
-        If a distance is not between 0 and 1.
     """
     for distance in distances:
         if not 0.0 < distance < 1.0:
@@ -78,12 +71,9 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
     measured = [_measured(row) for row in projected]
     joints = slice(3, robot.body.modules + 2)
     share = np.array([np.linalg.norm(each.mode[joints]) for each in expected])
-    swing = np.array(
-        [
-            2.0 * np.abs(_average(state[:, joints] * np.exp(-1j * turn * np.arange(_MEASURED))[:, None]))
-            for state, (_, turn) in zip(states, measured, strict=True)
-        ]
-    )
+    turned = (np.exp(-1j * turn * np.arange(_MEASURED))[:, None] for _, turn in measured)
+    pairs = zip(states, turned, strict=True)
+    swing = np.array([2.0 * np.abs(_average(state[:, joints] * each)) for state, each in pairs])
     period = robot.gait.period
     component = np.abs(point.mode[joints])
 
@@ -162,10 +152,8 @@ def _settled(models: list[FollowedModel], expected: list[_Expected], progress: P
         states = FollowedModel.flow_each(models, states, 0.0, period)
         if count % 100 == 0:
             progress((count + settling) / (settling + _MEASURED), "until the undulation has settled")
-    projected = np.array(
-        [(rows - each.orbit) @ each.left.conj() for rows, each in zip(recorded, expected, strict=True)]
-    )
-    return projected, recorded
+    pairs = zip(recorded, expected, strict=True)
+    return np.array([(rows - each.orbit) @ each.left.conj() for rows, each in pairs]), recorded
 
 
 def _measured(projected: ComplexArray) -> tuple[float, float]:
@@ -179,5 +167,4 @@ def _average(values: NDArray[np.inexact]) -> NDArray[np.inexact]:
     it converges faster than any power of the number of values (Das et al., Nonlinearity 30, 2017)."""
     t = (np.arange(len(values)) + 1.0) / (len(values) + 1.0)
     weight = np.exp(-1.0 / (t * (1.0 - t)))
-    mean: NDArray[np.inexact] = np.tensordot(weight / weight.sum(), values, axes=1)
-    return mean
+    return np.asarray(np.tensordot(weight / weight.sum(), values, axes=1))

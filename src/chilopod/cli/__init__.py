@@ -16,22 +16,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import (
-    branch,
-    doctor,
-    identify,
-    live,
-    map,
-    play,
-    reproduce,
-    robot,
-    sensitivity,
-    size,
-    stability,
-    targets,
-    trials,
-    walk,
-)
+from chilopod.cli import doctor, identify, live, reproduce, robot, studies, theory, trials, walks
 from chilopod.cli.commands import new_app
 from chilopod.errors import ChilopodError, ParameterError, briefly, one_line
 from chilopod.process import INTERRUPTED
@@ -43,18 +28,18 @@ _COMPLETION = "_CHILOPOD_COMPLETE"  # variable by which a shell asks for complet
 app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.", completion=True)
 app.command("reproduce", short_help="Repeat the paper, and write a report beside its numbers.")(reproduce.reproduce)
 app.add_typer(robot.app, name="robot")
-app.command("stability", short_help="Stability of the straight walk: its Floquet exponents.")(stability.stability)
-app.command("bifurcation", short_help="Points at which the straight walk gives way, and how.")(stability.bifurcation)
-app.command("branch", short_help="Curved walks beyond that point: how tightly they turn.")(branch.branch)
-app.command("sensitivity", short_help="What each number of a robot does to where it bends.")(sensitivity.sensitivity)
-app.command("compare", short_help="Differing numbers of two robots, and the part of each.")(sensitivity.compare)
-app.command("size", short_help="Numbers of a robot at which it does what is wished.")(size.size)
-app.command("map", short_help="Map over two numbers: where it holds, bends or undulates.")(map.stability_map)
-app.command("walk", short_help="Let a robot walk, and report where it gets to.")(walk.walk)
-app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(targets.turn)
-app.command("course", short_help="Walk from target to target, and report on each.")(targets.course)
+app.command("stability", short_help="Stability of the straight walk: its Floquet exponents.")(theory.stability)
+app.command("bifurcation", short_help="Points at which the straight walk gives way, and how.")(theory.bifurcation)
+app.command("branch", short_help="Curved walks beyond that point: how tightly they turn.")(theory.branch)
+app.command("sensitivity", short_help="What each number of a robot does to where it bends.")(studies.sensitivity)
+app.command("compare", short_help="Differing numbers of two robots, and the part of each.")(studies.compare)
+app.command("size", short_help="Numbers of a robot at which it does what is wished.")(studies.size)
+app.command("map", short_help="Map over two numbers: where it holds, bends or undulates.")(theory.stability_map)
+app.command("walk", short_help="Let a robot walk, and report where it gets to.")(walks.walk)
+app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(walks.turn)
+app.command("course", short_help="Walk from target to target, and report on each.")(walks.course)
 app.command("live", short_help="Watch a robot walk in the browser, and change it.")(live.live)
-app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(play.play)
+app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(live.play)
 app.add_typer(identify.app, name="identify")
 app.add_typer(trials.app, name="trials")
 app.command("doctor", short_help="Check the installation, and print what mends it.")(doctor.doctor)
@@ -117,16 +102,13 @@ def main(argv: Sequence[str] | None = None) -> int:
             named = ChilopodError(error.strerror or str(error), source=str(error.filename or ""))
             return _fail(str(named), USAGE_ERROR)
         if isinstance(error, MemoryError):
-            return _fail(
-                f"there is too little memory ({str(error) or 'how much more it takes is not known'})", USAGE_ERROR
-            )
+            lacking = str(error) or "how much more it takes is not known"
+            return _fail(f"there is too little memory ({lacking})", USAGE_ERROR)
         package = _not_imported(error)
         if package:
             return _fail(f"{package} cannot be imported: {briefly(error)} ({_mend(package)})", USAGE_ERROR)
-        return _fail(
-            f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
-            INTERNAL_ERROR,
-        )
+        said = f"{type(error).__name__}: {error} (--debug shows more)"
+        return _fail(f"this is a fault of chilopod, please report it: {said}", INTERNAL_ERROR)
     finally:
         trials_log.removeFilter(is_new)
     if code == INTERRUPTED:  # recent versions of typer make this of a KeyboardInterrupt

@@ -16,11 +16,8 @@ from chilopod.cli.options import JsonOption, print_result
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import OutputError, briefly
 
-_PACKAGES = {
-    **{name: name for name in ("numpy", "scipy", "numba")},
-    "mujoco": "mujoco-core",
-    **{name: name for name in ("xarray", "matplotlib", "av")},
-}
+_IMPORTED = ("numpy", "scipy", "numba", "mujoco", "xarray", "matplotlib", "av")
+_PACKAGES = {name: "mujoco-core" if name == "mujoco" else name for name in _IMPORTED}
 """Names of packages in imports, and in package registries."""
 
 BROKEN = 3
@@ -71,10 +68,8 @@ def doctor(as_json: JsonOption = False) -> None:
 def _versions() -> list[Finding]:
     import chilopod
 
-    found = [
-        Finding("chilopod", chilopod.__version__),
-        Finding("python", f"{platform.python_version()} ({platform.system()} {platform.machine()})"),
-    ]
+    python = f"{platform.python_version()} ({platform.system()} {platform.machine()})"
+    found = [Finding("chilopod", chilopod.__version__), Finding("python", python)]
     for module, package in _PACKAGES.items():
         # What uses a package here may be able to import it where it cannot be imported alone, or the other way round.
         fault = _fault({"mujoco": "chilopod.twin", "numba": "chilopod.integrate"}.get(module, module))

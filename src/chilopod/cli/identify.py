@@ -19,16 +19,10 @@ from chilopod.errors import AnalysisError, ParameterError, UnitError
 if TYPE_CHECKING:
     from chilopod.output import Content
     from chilopod.progress import Progress
-    from chilopod.tasks.identify import (
-        Identification,
-        NextMeasurements,
-        RecordedIdentification,
-        SelfTest,
-        TwinIdentification,
-    )
+    from chilopod.tasks import identify
 
-    Found = Identification | RecordedIdentification | TwinIdentification
-    More = dict[str, NextMeasurements | SelfTest]
+    Found = identify.Identification | identify.RecordedIdentification | identify.TwinIdentification
+    More = dict[str, identify.NextMeasurements | identify.SelfTest]
 
 app = new_app("Find constants of a model from measured or printed numbers.")
 
@@ -115,9 +109,8 @@ def planar(options: _PlanarOptions) -> None:
     from chilopod.paper.printed import critical_mode_data, variant_settings
 
     robot, given, variants = options.described, options.data, variant_settings() if options.data is None else {}
-    data: identify.CriticalMode | identify.RecordedWalks = (
-        identify.load_data(given, identify.CriticalMode, identify.RecordedWalks) if given else critical_mode_data()
-    )
+    kinds = identify.CriticalMode, identify.RecordedWalks
+    data = identify.load_data(given, *kinds) if given else critical_mode_data()
     others = {"--next": options.measure, "--check": options.check, "--points": options.points != _POINTS}
     field = next((name for name, on in others.items() if on), "")
     if field and isinstance(data, identify.RecordedWalks):

@@ -1,4 +1,4 @@
-"""``chilopod live``: a robot that walks in the browser."""
+"""``chilopod live`` and ``chilopod play``: a robot that walks in the browser, and a page in which it does so alone."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import EngineOption, ForceOption, SetOption, choices, free, read_robot, reading, with_options
+from chilopod.cli import options as shared
+from chilopod.cli.options import EngineOption, ForceOption, JsonOption, RobotArg, SetOption, choices, with_options
+from chilopod.cli.progress import progress_bar
 from chilopod.errors import OutputError, ParameterError
 from chilopod.live.ports import check_port
 from chilopod.live.wishes import LARGEST_SEED
@@ -25,35 +27,31 @@ StrategyOption = Annotated[
     str,
     typer.Option(help="Strategy at the start; the page can change it.", autocompletion=lambda: choices("ON_THE_WAY")),
 ]
-HostOption = Annotated[
-    str,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Address to listen at, by default for this machine only. At any other address, such as 0.0.0.0 (all), "
-        "a browser needs the token in the printed link.",
-    ),
-]
-TokenOption = Annotated[
-    bool, typer.Option("--token", help="Require the token on this machine too, where others use it as well.")
-]
 
 
 @dataclass(frozen=True)
 class LiveOptions:
     """Argument and options of ``live``, as they were typed."""
 
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
-    ] = "aoi2022-planar"
+    robot: RobotArg = "aoi2022-planar"
     engine: EngineOption = "planar"
     strategy: StrategyOption = "variable"
     seed: Annotated[
         int,
         typer.Option(metavar="N", min=0, max=LARGEST_SEED, help="Seed of the start and of the nudges of the floor."),
     ] = 1
-    host: HostOption = "127.0.0.1"
+    host: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Address to listen at, by default for this machine only. At any other address, such as 0.0.0.0 "
+            "(all), a browser needs the token in the printed link.",
+        ),
+    ] = "127.0.0.1"
     port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any free port.")] = 8080
-    token: TokenOption = False
+    token: Annotated[
+        bool, typer.Option("--token", help="Require the token on this machine too, where others use it as well.")
+    ] = False
     duration: Annotated[
         str | None, typer.Option(metavar="TIME", help='Time after which the page ends by itself, such as "10 min".')
     ] = None
@@ -76,12 +74,15 @@ def live(options: LiveOptions) -> None:
 
     Example: chilopod live aoi2022-planar --set "springs.stiffness[0]=15 N*mm/deg" --open
     """
-    seconds, out = _duration(options.duration), options.out
+    out, time = options.out, options.duration
+    seconds = math.inf if time is None else shared.quantity("duration", time, "s")
+    if not seconds > 0.0:
+        raise ParameterError("must be a time to walk", field="duration", value=seconds, allowed="more than 0 s")
     check_port(options.port)
     if out is not None:
         earlier = out.glob("chilopod-live-*") if out.is_dir() else ()
-        free([*_files(out, "chilopod-live-1"), *earlier], options.force)
-    described = read_robot(options.robot, options.overrides)
+        shared.free([*_files(out, "chilopod-live-1"), *earlier], options.force)
+    described = shared.read_robot(options.robot, options.overrides)
     from chilopod.live import Live
 
     named = {name: getattr(options, name) for name in ("engine", "seed", "strategy", "host", "port", "token")}
@@ -93,16 +94,6 @@ def live(options: LiveOptions) -> None:
         page.wait(seconds)
     finally:
         _end(page, options.force)
-
-
-def _duration(typed: str | None) -> float:
-    from chilopod import units
-
-    with reading("duration"):
-        seconds = math.inf if typed is None else units.parse(typed, "s")
-        if not seconds > 0.0:
-            raise ParameterError("must be a time to walk", value=seconds, allowed="more than 0 s")
-    return seconds
 
 
 def _keep(folder: Path, replace: bool, name: str, record: bytes, page: str) -> None:
@@ -127,3 +118,32 @@ def _end(page: Live, replace: bool) -> None:
 
 def _files(folder: Path, name: str) -> list[Path]:
     return [folder / f"{name}.nc", folder / f"{name}.html"]
+
+
+def play(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="Robot file, or the preset aoi2022-planar.")
+    ] = "aoi2022-planar",
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="HTML file to write.")] = Path("play.html"),
+    browser: Annotated[bool, typer.Option("--open", help="Open the page in a browser too.")] = False,
+    overrides: SetOption = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a page in which the planar robot walks in any browser: drag its first spring, click the floor.
+
+    The page is one file of about 44 kB. It computes the planar model itself, loads nothing, and opens from disk.
+
+    The address sets the first spring and the seed: play.html?k1=8&seed=2.
+
+    Example: chilopod play aoi2022-planar --out play.html
+    """
+    from chilopod.show.play import play as page
+
+    described = shared.read_robot(robot, overrides)
+    shared.free([out], force, ".html")
+    with progress_bar("play") as show:
+        html = page(described, lambda done, words: show("branch of curved walks", done, words))
+    shared.save(out, html, described, force=force, as_json=as_json)
+    if browser:
+        webbrowser.open(out.resolve().as_uri())

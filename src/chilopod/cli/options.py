@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import MISSING, dataclass, fields
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import ChilopodError, OutputError, ParameterError, nearest_name
+from chilopod.errors import ChilopodError, OutputError, ParameterError, concerning
 
 if TYPE_CHECKING:
     from chilopod.analysis import Onset
@@ -56,12 +56,6 @@ ParameterOption = Annotated[
         "springs.stiffness, all springs together.",
     ),
 ]
-BetweenOption = Annotated[
-    tuple[str, str],
-    typer.Option(
-        metavar="LOW HIGH", help='Interval of its values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'
-    ),
-]
 OnsetBetweenOption = Annotated[
     tuple[str, str] | None,
     typer.Option(
@@ -85,15 +79,12 @@ EngineOption = Annotated[
 ]
 
 
-@contextmanager
-def reading(option: str, *words: str) -> Iterator[None]:
-    """Give errors in this block the name of an option (its name in Python) as their field, and words it may be."""
-    try:
-        yield
-    except ChilopodError as error:
-        error.field, error.nearest = option, error.nearest or nearest_name(str(error.value), words)
-        error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
-        raise
+def quantity(option: str, text: str, unit: str) -> float:
+    """Read the value of an option, in SI units."""
+    from chilopod import units
+
+    with concerning(option):
+        return units.parse(text, unit)
 
 
 def read_robot(robot: str | Robot, overrides: Sequence[str] | None) -> Robot:
@@ -101,11 +92,8 @@ def read_robot(robot: str | Robot, overrides: Sequence[str] | None) -> Robot:
     from chilopod.robot import Robot, load_robot
 
     described = robot if isinstance(robot, Robot) else load_robot(robot)
-    try:
+    with concerning(within="--set"):
         return described.set_from_text(overrides or ())
-    except ChilopodError as error:
-        error.field = f"--set {error.field or ''}".strip()
-        raise
 
 
 @dataclass(frozen=True)
@@ -166,24 +154,16 @@ class OnsetOptions(RobotOptions):
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
     """Decorator that shows typer the fields of a command's first argument, a dataclass, beside its other arguments."""
-    first, *own = (
-        each.replace(kind=Parameter.KEYWORD_ONLY) for each in signature(command, eval_str=True).parameters.values()
-    )
+    arguments = signature(command, eval_str=True).parameters.values()
+    first, *own = (each.replace(kind=Parameter.KEYWORD_ONLY) for each in arguments)
     hints = get_type_hints(first.annotation, include_extras=True)
-    robot, *shared = (
-        Parameter(
-            each.name,
-            Parameter.KEYWORD_ONLY,
-            default=Parameter.empty if each.default is MISSING else each.default,
-            annotation=hints[each.name],
-        )
-        for each in fields(first.annotation)
-    )
+    given = signature(first.annotation).parameters.values()
+    robot, *shared = (each.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[each.name]) for each in given)
     common = {each.name for each in fields(RobotOptions)}
 
-    def run(**given: Any) -> None:
-        options = {each.name: given.pop(each.name) for each in (robot, *shared)}
-        command(first.annotation(**options), **given)
+    def run(**typed: Any) -> None:
+        options = {each.name: typed.pop(each.name) for each in (robot, *shared)}
+        command(first.annotation(**options), **typed)
 
     # What all commands have comes last.
     seen = [robot, *own, *sorted(shared, key=lambda each: each.name in common)]
@@ -244,10 +224,10 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
     from chilopod import units
     from chilopod.analysis.parameters import check_parameter
 
-    with reading("parameter"):
+    with concerning("parameter"):
         check_parameter(robot, parameter)
     unit = robot.si_unit_of(parameter)
-    with reading(f"between {parameter}"):
+    with concerning(f"between {parameter}"):
         low, high = (units.parse(text, unit) for text in between)
         for text in between:
             robot.override(parameter, text)
@@ -264,10 +244,8 @@ def note_si(robot: Robot, path: str, option: str, ends: Sequence[str]) -> None:
     with suppress(ChilopodError):
         unit, shown = robot.si_unit_of(path), robot.unit_of(path)
         if shown != unit and any(map(_bare, ends)):
-            low, high = (units.parse(end, unit) for end in ends)
-            taken, own = (
-                f"{units.format(low, u, digits=4)} to {units.format(high, u, digits=4)}" for u in (unit, shown)
-            )
+            values = [units.parse(end, unit) for end in ends]
+            taken, own = (" to ".join(units.format(value, u, digits=4) for value in values) for u in (unit, shown))
             typer.echo(f"note: a number without a unit is SI: {option} is {taken}, that is {own}", err=True)
 
 
@@ -275,14 +253,14 @@ def onset_of(robot: Robot, parameter: str, between: tuple[str, str] | None, at: 
     """Read the number that bends a robot, its interval, and the value at which walks are studied."""
     from chilopod.analysis.parameters import check_parameter
 
-    with reading("parameter"):
+    with concerning("parameter"):
         check_parameter(robot, parameter)
     limits = between and interval(robot, parameter, between)
-    with reading("at"):
+    with concerning("at"):
         studied = None if at is None else robot.override(parameter, at).get(parameter)
     from chilopod.analysis import Onset
 
-    with reading("between"):
+    with concerning("between"):
         return Onset(parameter, limits, studied)
 
 

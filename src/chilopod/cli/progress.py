@@ -70,20 +70,16 @@ def _bars(doing: str, states: _States, over: threading.Event) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-    columns = (
-        TextColumn("{task.description:<44}"),
-        BarColumn(bar_width=24),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[words]}", style="dim"),
-    )
+    title, words = TextColumn("{task.description:<44}"), TextColumn("{task.fields[words]}", style="dim")
+    columns = title, BarColumn(bar_width=24), TimeElapsedColumn(), words
     tasks: dict[str, TaskID] = {}
     with Progress(*columns, console=Console(stderr=True)) as bar:
         alone = bar.add_task(doing, total=None, words="")
         last = False
         while not last:
             last = over.wait(_BETWEEN_LOOKS)
-            for title, (done, words) in dict(states).items():
-                if title not in tasks:
-                    tasks[title] = bar.add_task(title, total=1.0, words="")
-                bar.update(tasks[title], completed=done, words=words)
+            for name, (done, said) in dict(states).items():
+                if name not in tasks:
+                    tasks[name] = bar.add_task(name, total=1.0, words="")
+                bar.update(tasks[name], completed=done, words=said)
             bar.update(alone, visible=not tasks, words=_ONCE if _compiling() else "")

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.commands import new_app
-from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, print_result, read_robot, reading, save
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, print_result, read_robot, save
+from chilopod.errors import ChilopodError, ParameterError, concerning
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
@@ -81,10 +81,10 @@ def _lengthened(robot: Robot, module_length: str | None, body_length: str | None
     if module_length and body_length:
         raise ParameterError("must not be given with --body-length", field="module_length", value=module_length)
     if body_length:
-        with reading("body_length"):
+        with concerning("body_length"):
             return robot.override("body.length", body_length)
     if module_length:
-        with reading("module_length"):
+        with concerning("module_length"):
             return robot.with_value("body.length", units.parse(module_length, "m") * robot.body.modules)
     return robot
 

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from chilopod.cli.options import EngineOption, RobotOptions, deliver, free, print_result, reading
+from chilopod.cli.options import EngineOption, RobotOptions, deliver, free, print_result
 from chilopod.cli.progress import progress_bar
+from chilopod.errors import ChilopodError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod import tasks
@@ -27,30 +28,6 @@ Found = TypeVar("Found", bound="Runs")
 _SLOW = 0.5  # of the time of walks
 _NOTICED = 1.0  # s
 
-SeedOption = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        min=0,
-        help="Seed of small random disturbances of start, feet and sensor; the same seed gives the same walk. Without "
-        "it nothing is disturbed.",
-    ),
-]
-ControllerOption = Annotated[
-    str | None,
-    typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
-]
-TrialsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--trials",
-        metavar="FOLDER",
-        help="Folder that keeps all trials; a trial that is there already is not walked again.",
-    ),
-]
-RepeatsOption = Annotated[
-    int, typer.Option(metavar="N", min=1, max=100_000, help="Number of walks; their seeds count up from --seed.")
-]
 ClusterOption = Annotated[
     str | None,
     typer.Option(
@@ -65,11 +42,31 @@ ClusterOption = Annotated[
 class WalkOptions(RobotOptions):
     """Argument and options that walk, turn and course share, as they were typed."""
 
-    seed: SeedOption = None
-    repeats: RepeatsOption = 1
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Seed of small random disturbances of start, feet and sensor; the same seed gives the same walk. "
+            "Without it nothing is disturbed.",
+        ),
+    ] = None
+    repeats: Annotated[
+        int, typer.Option(metavar="N", min=1, max=100_000, help="Number of walks; their seeds count up from --seed.")
+    ] = 1
     engine: EngineOption = "planar"
-    controller: ControllerOption = None
-    trials: TrialsOption = None
+    controller: Annotated[
+        str | None,
+        typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
+    ] = None
+    trials: Annotated[
+        Path | None,
+        typer.Option(
+            "--trials",
+            metavar="FOLDER",
+            help="Folder that keeps all trials; a trial that is there already is not walked again.",
+        ),
+    ] = None
     cluster: ClusterOption = None
 
     @property
@@ -87,9 +84,13 @@ class WalkOptions(RobotOptions):
 
     def spring(self, path: str | None, k1: str, *words: str) -> float:
         """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad; errors name words that it may be."""
-        with reading("k1", *words):
-            path = path or "springs.stiffness"
+        path = path or "springs.stiffness"
+        try:
             return self.described.override(path, k1).get(path)
+        except ChilopodError as error:
+            error.field, error.nearest = "k1", error.nearest or nearest_name(str(error.value), words)
+            error.allowed = ", ".join(filter(None, (*words, error.allowed))) or None
+            raise
 
     @contextmanager
     def walking(self, what: str) -> Iterator[Callable[[str], Progress]]:
@@ -169,7 +170,5 @@ def own_code(show: Callable[[str, float, str], None]) -> Iterator[None]:
         if added:
             sys.path.remove(here)
     if spent.share > _SLOW and spent.controller > _NOTICED:
-        typer.echo(
-            f"the controller took {100.0 * spent.share:.0f} % of the time of all walks, {spent.controller:.1f} s",
-            err=True,
-        )
+        share, seconds = f"{100.0 * spent.share:.0f} %", f"{spent.controller:.1f} s"
+        typer.echo(f"the controller took {share} of the time of all walks, {seconds}", err=True)

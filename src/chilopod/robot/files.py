@@ -50,12 +50,8 @@ def presets() -> list[str]:
 
 
 def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
-    """Read a robot file, or a preset by its name: the table of the file, not yet validated, and the name of the source
-    for messages.
-
-    Write ``./name`` for a file with the name of a preset. RobotFileError if the file or preset is missing, or is not
-    valid TOML.
-    """
+    """Read a robot file, or a preset by its name: the table of the file, not yet validated, and its name in messages.
+    Write ``./name`` for a file with the name of a preset. RobotFileError if that is missing, or is not valid TOML."""
     if not isinstance(robot, str | Path):
         raise RobotFileError("must be a preset or the path of a robot file", field="robot", value=robot)
     source, path = str(robot), Path(robot)

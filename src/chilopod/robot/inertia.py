@@ -12,11 +12,8 @@ from chilopod.robot.parts import Body, Legs, Twin
 
 
 def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
-    """Yaw inertia of one whole module with its legs about its centre, kg*m^2.
-
-    The given value, else that of a uniform rod of the module's mass and length. In a very short module legs and body
-    width alone exceed the rod; then it is the least possible value.
-    """
+    """Yaw inertia of one whole module with its legs about its centre, kg*m^2: as given, else of a uniform rod of the
+    module's mass and length, or the least possible value where legs and body width of a short module exceed the rod."""
     if body.yaw_inertia is not None:
         return body.yaw_inertia
     rod = body.mass / body.modules * (body.length / body.modules) ** 2 / 12.0
@@ -37,10 +34,8 @@ def body_mass(body: Body, twin: Twin) -> float:
 
 def body_inertia(body: Body, legs: Legs, twin: Twin) -> tuple[float, float, float]:
     """Inertia of a module's body without its legs, about its long axis, about its transverse axis and in yaw, kg*m^2.
-
     Across, the body is a uniform box; along, its mass is spread so that body and legs together have the yaw inertia of
-    :func:`module_yaw_inertia`. Such a body exists within :func:`yaw_inertia_range`.
-    """
+    :func:`module_yaw_inertia`. Such a body exists within :func:`yaw_inertia_range`."""
     mass = body_mass(body, twin)
     across, upright = mass * twin.body_width**2 / 12.0, mass * twin.body_height**2 / 12.0
     yaw = module_yaw_inertia(body, legs, twin) - legs_yaw_inertia(legs, twin)
@@ -65,9 +60,7 @@ def legs_yaw_inertia(legs: Legs, twin: Twin) -> float:
 
 
 def link_inertia(twin: Twin, length: float) -> tuple[float, float]:
-    """Inertia of a link across and about its own axis, kg*m^2: a uniform rod.
-
-    About its axis it is as thick as a foot, but never more than across: nothing is singular.
-    """
+    """Inertia of a link across and about its own axis, kg*m^2: a uniform rod. About its axis it is as thick as a foot,
+    but never more than across: nothing is singular."""
     across = twin.link_mass * length**2 / 12.0
     return across, min(across, 0.5 * twin.link_mass * twin.foot_radius**2)

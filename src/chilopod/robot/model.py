@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import PlainValidator, model_validator
 
 from chilopod import units
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ChilopodError, ParameterError, concerning
 from chilopod.gait import Gait
 from chilopod.ground import GRAVITY, Ground
 from chilopod.robot.files import Table, described, parsed, read_table, to_toml
@@ -25,10 +26,6 @@ _OVERRIDDEN: Final = "set by override"
 _COPIED: Final = "copied from "
 _LONGEST: Final = 1000  # characters of a provenance
 _DERIVED: Final = "body.yaw_inertia"  # the one optional number that has a value where none is given
-
-
-def _name(text: object) -> str:
-    return _printable(text, longest=100)
 
 
 def _printable(text: object, longest: int) -> str:
@@ -54,16 +51,14 @@ def _provenance(table: object) -> Table:
         if isinstance(text, Mapping):
             pending.extendleft((f"{path}.{key}", item) for key, item in reversed([*text.items()]))
             continue
-        try:
+        with concerning(path):
             flat[path] = _printable(text, _LONGEST)
-        except ParameterError as error:
-            error.field = path
-            raise
     return Table(flat)
 
 
 class Robot(Description):
-    """A many-legged robot with a flexible body axis, its gait and its floor.
+    """A many-legged robot with a flexible body axis, its gait and its floor; UnitError or ParameterError names the
+    first field that is wrong.
 
     Attributes
     ----------
@@ -75,14 +70,9 @@ class Robot(Description):
         Constants that only the three-dimensional model reads; None for a robot of the planar model alone.
     provenance
         Origin of the numbers: text by dotted path.
-
-    Raises
-    ------
-    UnitError, ParameterError
-        On construction, naming the first field that is wrong.
     """
 
-    name: Annotated[str, PlainValidator(_name)]
+    name: Annotated[str, PlainValidator(partial(_printable, longest=100))]
     body: Body
     springs: Springs
     legs: Legs
@@ -93,8 +83,7 @@ class Robot(Description):
 
     @classmethod
     def load(cls, robot: str | Path) -> Self:
-        """Read a robot file, or a preset by its name; RobotFileError names the place and the fault of an invalid
-        one."""
+        """Read a robot file, or a preset by its name; RobotFileError names place and fault of an invalid one."""
         return described(cls, *read_table(robot))
 
     @classmethod
@@ -122,17 +111,13 @@ class Robot(Description):
         for key in quantities(Springs):
             values = getattr(self.springs, key)
             if values is not None and len(values) != joints:
+                problem = f"must have one value for each joint, not {len(values)}"
                 allowed = f"{joints}, one fewer than body.modules, or a single value for all"
-                raise ParameterError(
-                    f"must have one value for each joint, not {len(values)}", field=f"springs.{key}", allowed=allowed
-                )
+                raise ParameterError(problem, field=f"springs.{key}", allowed=allowed)
         for path in self.provenance:
-            try:
+            with concerning(f"provenance.{path}"):
                 if isinstance(self._locate(path).index, slice):
                     raise ParameterError("must be the path of one spring or of all")
-            except ParameterError as error:
-                error.field = f"provenance.{path}"
-                raise
         return self
 
     @property
@@ -185,12 +170,10 @@ class Robot(Description):
         return tuple(f"{stem}[{i}]" for i in place.joints(self.body.modules - 1)) if place.quantity.each else (stem,)
 
     def get(self, path: str) -> float:
-        """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``.
-
-        Without an index the springs count as one parameter, as do those of a group such as ``springs.stiffness[1:]``,
-        which has a value if all are alike. ``body.yaw_inertia`` is `module_yaw_inertia` where none is given. Here and
-        below, a path that is not that of a number raises ParameterError.
-        """
+        """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``. Without an index the
+        springs count as one parameter, as do those of a group such as ``springs.stiffness[1:]``, which has a value if
+        all are alike. ``body.yaw_inertia`` is `module_yaw_inertia` where none is given. Here and below, a path that is
+        not that of a number raises ParameterError."""
         place = self._locate(path)
         if path == _DERIVED:
             return self.module_yaw_inertia
@@ -214,20 +197,15 @@ class Robot(Description):
         return self._locate(path).quantity.si
 
     def with_value(self, path: str, value: float) -> Self:
-        """Return this robot with one parameter changed to `value` in SI units; about 20 us, for sweeps.
-
-        `path` is as for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring
-        and damper for new joints, and drops those of removed ones. Length and mass are those of the whole robot and
-        stay. The provenance of a changed parameter becomes a note that it was overridden. ParameterError if `value` is
-        out of range.
-        """
+        """Return this robot with one parameter changed to `value` in SI units; about 20 us, for sweeps. `path` is as
+        for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring and damper
+        for new joints, and drops those of removed ones; length and mass of the whole robot stay. The provenance of a
+        changed parameter says that it was overridden. ParameterError if `value` is out of range."""
         return self._changed(path, lambda quantity: quantity.check(value))
 
     def override(self, path: str, value: object) -> Self:
-        """Return this robot with one parameter changed: a number in SI units or text with its unit.
-
-        Like `with_value`; also raises `UnitError` if the text is not a quantity or has another dimension.
-        """
+        """Return this robot with one parameter changed: a number in SI units or text with its unit. Like `with_value`;
+        also raises `UnitError` if the text is not a quantity or has another dimension."""
         return self._changed(path, lambda quantity: quantity.read(value))
 
     def set_from_text(self, assignments: Iterable[str]) -> Self:
@@ -250,8 +228,7 @@ class Robot(Description):
         return self.with_(twin=other.twin, provenance={**self.provenance, **texts})
 
     def copied(self) -> Self:
-        """Return this robot with provenance that names it as what numbers were copied from, but for those that were
-        overridden, or copied before."""
+        """Return this robot with provenance that names it as the origin of all but overridden and copied numbers."""
         before = f"{_COPIED}{self.name}"
         texts = {
             path: text if text == _OVERRIDDEN or text.startswith(_COPIED) else f"{before}: {text}"[:_LONGEST]
@@ -267,10 +244,8 @@ class Robot(Description):
 
     def listed(self) -> list[tuple[str, str, str]]:
         """Return path, quantity with its unit, and origin (or nothing) of every number of this robot."""
-        return [
-            (path, units.format(self.get(path), self.unit_of(path), digits=6), self.provenance_of(path) or "")
-            for path in self.parameters()
-        ]
+        numbers = ((path, self.get(path), self.unit_of(path)) for path in self.parameters())
+        return [(path, units.format(x, unit, digits=6), self.provenance_of(path) or "") for path, x, unit in numbers]
 
     def _repr_svg_(self) -> str:
         # Only notebooks draw, so the drawing is imported here.
@@ -337,9 +312,8 @@ class Robot(Description):
         if place.quantity.each:
             if old is None:
                 if place.index is not None and not isinstance(place.quantity, Flag):
-                    raise ParameterError(
-                        "must be a parameter that this robot has", allowed=f"{path.partition('[')[0]} for all of them"
-                    )
+                    allowed = f"{path.partition('[')[0]} for all of them"
+                    raise ParameterError("must be a parameter that this robot has", allowed=allowed)
                 old = (False,) * (self.body.modules - 1)
             chosen = place.joints(len(old))
             new = tuple(value if index in chosen else item for index, item in enumerate(old))
@@ -353,9 +327,8 @@ class Robot(Description):
         joints = 0 if place.quantity.each and place.index is None else self.body.modules - 1
         if place.quantity is MODULES:
             joints = int(value) - 1
-            changes["springs"] = self.springs.model_copy(
-                update={key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
-            )
+            resized = {key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
+            changes["springs"] = self.springs.model_copy(update=resized)
         texts = dict(self.provenance)
         if joints != self.body.modules - 1:
             texts = {name: text for name, text in texts.items() if spring_index(name, path) < joints}

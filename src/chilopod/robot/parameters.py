@@ -20,8 +20,7 @@ _INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # tolerates spaces and 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Place of a parameter: section, key, index among the springs, slice of a group of them, or None for all, and
-    allowed values."""
+    """Place of a parameter: section, key, index among the springs, slice of a group or None for all; and its values."""
 
     section: str
     key: str
@@ -35,14 +34,8 @@ class Place:
         return range(count)[self.index or slice(None)]
 
 
-SECTIONS: Final[dict[str, type[Description]]] = {
-    "body": Body,
-    "springs": Springs,
-    "legs": Legs,
-    "gait": Gait,
-    "ground": Ground,
-    "twin": Twin,
-}
+_PARTS: Final[tuple[type[Description], ...]] = (Body, Springs, Legs, Gait, Ground, Twin)
+SECTIONS: Final = {part.__name__.lower(): part for part in _PARTS}
 QUANTITIES: Final = {
     f"{section}.{key}": quantity for section, model in SECTIONS.items() for key, quantity in quantities(model).items()
 }
@@ -66,9 +59,8 @@ def place_of(path: str) -> Place:
         if nearest is None:
             raise ParameterError("must be the path of a parameter", field=path, allowed=", ".join(known))
         meant = _INDEX.fullmatch(rest) if known[nearest].each else None
-        raise ParameterError(
-            "must be the path of a parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest
-        )
+        nearest = f"{nearest}[{meant[1]}]" if meant else nearest
+        raise ParameterError("must be the path of a parameter", field=path, nearest=nearest)
     quantity = known[stem]
     if (index is not None or group) and not quantity.each:
         raise ParameterError("must be written without an index", field=path, allowed=stem)

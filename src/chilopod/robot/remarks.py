@@ -15,9 +15,8 @@ def remarks(robot: Robot) -> list[str]:
     """Return a sentence for every unusual property of a valid robot; an empty list if there is none."""
     found = []
     if not robot.gait.half_period_symmetric:
-        found.append(
-            "Left and right legs are not half a period apart: analyses use the whole period, at twice the work."
-        )
+        legs = "Left and right legs are not half a period apart"
+        found.append(f"{legs}: analyses use the whole period, at twice the work.")
     standing = robot.gait.schedule(robot.body.modules).contact
     if not standing.any(axis=(1, 2)).all():
         found.append("There are moments when no foot of the robot stands.")
@@ -30,20 +29,15 @@ def remarks(robot: Robot) -> list[str]:
         found.append("Legs of neighbouring modules collide: feet on one side pass each other.")
     springs, joints = robot.springs, robot.body.modules - 1
     ranges = zip(springs.softest or (0.0,) * joints, springs.stiffest or (math.inf,) * joints, strict=True)
-    kept = zip(springs.adjustable or (False,) * joints, springs.stiffness, ranges, strict=True)
-    outside = [
-        i + 1 for i, (moves, stiffness, (low, high)) in enumerate(kept) if moves and not low <= stiffness <= high
-    ]
+    kept = enumerate(zip(springs.adjustable or (False,) * joints, springs.stiffness, ranges, strict=True), 1)
+    outside = [i for i, (moves, stiffness, (low, high)) in kept if moves and not low <= stiffness <= high]
     if outside:
         found.append(f"Springs {', '.join(map(str, outside))} begin outside the range of their actuators.")
     found += _out_of_proportion(robot)
     own = {path: (shown, origin) for path, shown, origin in robot.listed() if path != "body.yaw_inertia"}
     theirs = [row for name in presets() for row in Robot.load(name).copied().listed() if row[0] in own]
-    stale = {
-        path
-        for path, shown, text in theirs
-        if own[path][1] in (text, text.partition(": ")[2]) and own[path][0] != shown
-    }
+    alike = [row for row in theirs if own[row[0]][1] in (row[2], row[2].partition(": ")[2])]
+    stale = {path for path, shown, _ in alike if own[path][0] != shown}
     if stale:
         found.append(f"Numbers that are not those of the preset, with its provenance: {', '.join(sorted(stale))}.")
     unexplained = [path for path in robot.parameters() if robot.provenance_of(path) is None]

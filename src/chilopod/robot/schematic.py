@@ -17,10 +17,8 @@ _UNIT = "N*mm/deg"
 
 
 def schematic(body: Body, springs: Springs, legs: Legs, gait: Gait, name: str) -> str:
-    """SVG of modules, joints with their springs, and feet at time 0, filled where they stand.
-
-    The robot walks to the right. Only the front modules of a very long robot are drawn.
-    """
+    """SVG of modules, joints with their springs, and feet at time 0, filled where they stand. The robot walks to the
+    right. Only the front modules of a very long robot are drawn."""
     count = min(body.modules, _MOST)
     length = body.length / body.modules
     phases = gait.leg_phases(body.modules)[:count]
@@ -40,9 +38,8 @@ def schematic(body: Body, springs: Springs, legs: Legs, gait: Gait, name: str) -
             ahead, left = feet[module, side]
             foot = centre + scale * ahead, middle - scale * left
             hip = centre + scale * hip_ahead, middle + sign * 0.5 * scale * width
-            parts.append(
-                f'<line x1="{hip[0]:.1f}" y1="{hip[1]:.1f}" x2="{foot[0]:.1f}" y2="{foot[1]:.1f}" stroke="{INK}"/>'
-            )
+            ends = f'x1="{hip[0]:.1f}" y1="{hip[1]:.1f}" x2="{foot[0]:.1f}" y2="{foot[1]:.1f}"'
+            parts.append(f'<line {ends} stroke="{INK}"/>')
             parts.append(disc(*foot, 4.0, COLORS[1], 1.0 if stands[module, side] else 0.2))
         parts.append(
             f'<rect x="{centre - _OWN * scale * length:.1f}" y="{middle - 0.5 * scale * width:.1f}" '

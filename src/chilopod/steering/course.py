@@ -11,7 +11,7 @@ import numpy as np
 
 from chilopod import units
 from chilopod.engine.arguments import as_number
-from chilopod.errors import ParameterError, UnitError, nearest_name
+from chilopod.errors import ParameterError, UnitError, concerning, nearest_name
 from chilopod.frozen import Array
 from chilopod.record import in_range
 from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
@@ -34,6 +34,7 @@ _DIGITS = 9  # decimal places of a distance, so that rounding does not exclude 0
 @dataclass(frozen=True)
 class Goal:
     """Target of a course: a position on the floor, or relative to the robot at the time the target is set.
+    ParameterError if it is too far, or is relative and within the arrival radius.
 
     Attributes
     ----------
@@ -42,11 +43,6 @@ class Goal:
         left.
     relative
         True if the position is relative to module 1 at the end of the goal before.
-
-    Raises
-    ------
-    ParameterError
-        If the target is too far, or is relative and within the arrival radius.
     """
 
     x: float
@@ -60,22 +56,14 @@ class Goal:
         distance = round(math.hypot(self.x, self.y), _DIGITS)
         if not (ARRIVAL_RADIUS if self.relative else -1.0) < distance <= FARTHEST:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
-            allowed = f"{near}at most {FARTHEST:g} m"
-            raise ParameterError(
-                "must be a distance to walk", field="target distance", value=f"{distance:g} m", allowed=allowed
-            )
+            value, allowed = f"{distance:g} m", f"{near}at most {FARTHEST:g} m"
+            raise ParameterError("must be a distance to walk", field="target distance", value=value, allowed=allowed)
 
     @classmethod
     def parse(cls, text: str) -> Goal:
         """Read ``"45 deg, 1.3 m"``: direction and distance from module 1, or ``"1.2 m, 0.5 m"``: x and y on the floor.
-
-        A direction is relative to the heading, left positive, -180 to 180 deg.
-
-        Raises
-        ------
-        ParameterError, UnitError
-            For any other text, or a position out of range.
-        """
+        A direction is relative to the heading, left positive, -180 to 180 deg. ParameterError or UnitError for any
+        other text, or a position out of range."""
         first, comma, second = (part.strip() for part in text.partition(","))
         fits = [unit for unit in ("rad", "m") if _is_quantity(first, unit)]
         if not comma or len(fits) != 1:
@@ -83,11 +71,8 @@ class Goal:
             problem = "must have a unit behind its first number" if comma and fits else "must be a target"
             raise ParameterError(problem, field="target", value=text.strip(), allowed=_FORM)
         value = units.parse(first, fits[0])
-        try:
+        with concerning("target"):
             other = units.parse(second, "m")
-        except UnitError as error:
-            error.field = "target"
-            raise
         if fits == ["m"]:
             return cls(value, other, relative=False)
         if not abs(value) <= math.pi or other < 0.0:
@@ -101,8 +86,7 @@ class Goal:
         return f"{math.degrees(math.atan2(self.y, self.x)):g} deg, {math.hypot(self.x, self.y):g} m"
 
     def place(self, poses: Array) -> Array:
-        """Position on the floor, m, shape (..., 2), from the poses of module 1 when the goal is set: x, y (m) and
-        heading (rad), shape (..., 3)."""
+        """Position on the floor, m, shape (..., 2), from x, y (m) and heading (rad) when it is set, shape (..., 3)."""
         if not self.relative:
             return np.tile([self.x, self.y], (*poses.shape[:-1], 1))
         x, y, heading = poses.T
@@ -112,7 +96,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Course:
-    """Targets one after another.
+    """Targets one after another; ParameterError if they are no course.
 
     Attributes
     ----------
@@ -125,11 +109,6 @@ class Course:
         Radius of the circles of the shortest path to a target, m; 0 for a robot that turns on the spot. The radius of a
         radius law is the paper's measure of the body axis: module 1 itself follows smaller circles, so that a walk may
         be shorter than this path.
-
-    Raises
-    ------
-    ParameterError
-        If that is no course.
     """
 
     goals: tuple[Goal, ...]
@@ -195,20 +174,10 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
 
 
 def course_named(text: str, patience: float) -> Course:
-    """Read a course with a patience for each target, s.
-
-    Parameters
-    ----------
-    text
-        Targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or the
-        path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or ``random:SEED``.
-        Write ``./name`` for a file with the name of a course.
-
-    Raises
-    ------
-    ParameterError, UnitError
-        For any other text; the message names the wrong target.
-    """
+    """Read a course with a patience for each target, s; ParameterError or UnitError names a fault. The text has targets
+    as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or is the path of a
+    file (``./name`` for one with the name of a course) with a target a line, ``#`` before comments; or a name of
+    :data:`COURSES`; or ``random:SEED``."""
     if text in COURSES:
         return Course(COURSES[text], patience)
     if text.startswith(_RANDOM):
@@ -228,25 +197,18 @@ def course_named(text: str, patience: float) -> Course:
 
 def _goals_in(path: str) -> tuple[Goal, ...]:
     lines = (line.partition("#")[0].strip() for line in read_text(path, "course", ParameterError).splitlines())
-    try:
+    with concerning(source=path):
         return _goals([line for line in lines if line])
-    except (ParameterError, UnitError) as error:
-        error.source = path
-        raise
 
 
 def _goals(texts: list[str]) -> tuple[Goal, ...]:
     if not 1 <= len(texts) <= MOST_GOALS:
         raise _wrong_count(len(texts))
-    return tuple(_goal(number, text) for number, text in enumerate(texts, 1))
-
-
-def _goal(number: int, text: str) -> Goal:
-    try:
-        return Goal.parse(text)
-    except (ParameterError, UnitError) as error:
-        error.field = f"target {number}"
-        raise
+    goals = []
+    for number, text in enumerate(texts, 1):
+        with concerning(f"target {number}"):
+            goals.append(Goal.parse(text))
+    return tuple(goals)
 
 
 def _seed(text: str) -> int:

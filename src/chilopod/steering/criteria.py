@@ -62,30 +62,18 @@ def arrivals(record: xr.Dataset) -> Array:
     never. The record has ``distance`` over (time, robot)."""
     distance, time = record.distance.transpose("time", "robot").values, record.time.values
     inside = distance < ARRIVAL_RADIUS
-    first = inside.argmax(0)
-    found = np.full(distance.shape[1], np.nan)
-    for robot in np.flatnonzero(inside.any(0)):
-        i = first[robot]
-        if i == 0:
-            found[robot] = time[0]
-            continue
-        before, after = distance[i - 1, robot], distance[i, robot]
-        found[robot] = time[i - 1] + (before - ARRIVAL_RADIUS) / (before - after) * (time[i] - time[i - 1])
+    found = np.where(inside[0], time[0], np.nan)
+    later = np.flatnonzero(inside.any(0) & ~inside[0])
+    i = inside.argmax(0)[later]
+    before, after = distance[i - 1, later], distance[i, later]
+    found[later] = time[i - 1] + (before - ARRIVAL_RADIUS) / (before - after) * (time[i] - time[i - 1])
     return found
 
 
 def evaluate(record: xr.Dataset, time: float) -> Criteria:
-    """Criteria of every walk of a record.
-
-    Parameters
-    ----------
-    record
-        Record of turning tasks: ``distance`` and ``bearing`` over (time, robot), ``status`` and, if the legs were
-        steered, ``command`` over (event, robot, side).
-    time
-        The evaluation time: in the paper the earliest at which any robot arrives, 23 s. A model that walks faster
-        has an earlier one.
-    """
+    """Criteria of every walk of a record of turning tasks at a time: in the paper the earliest at which any robot
+    arrives, 23 s. A model that walks faster has an earlier one. The record has ``distance`` and ``bearing`` over (time,
+    robot), ``status`` and, if the legs were steered, ``command`` over (event, robot, side)."""
     distance = record.distance.transpose("time", "robot").values
     bearing = record.bearing.transpose("time", "robot").values
     walked = np.isfinite(distance).all(0)

@@ -39,20 +39,10 @@ class RadiusLaw(ReadOnlyArrays):
 
     @classmethod
     def of_branch(cls, values: ArrayLike, radii: ArrayLike, stable: ArrayLike, unit: str) -> RadiusLaw:
-        """Build the law from a branch of curved walks that starts at its pitchfork.
-
-        Parameters
-        ----------
-        values, radii, stable, unit
-            Parameter in SI units, radius in m and stability of the walk along the branch, from the pitchfork (included)
-            on, shape (points,); unit of the values in messages.
-
-        Raises
-        ------
-        AnalysisError
-            If the walks beside the pitchfork are not stable or do not tighten as the parameter falls, so that no spring
-            sets the radius of a turn.
-        """
+        """Build the law from a branch of curved walks that starts at its pitchfork: parameter in SI units, radius in m
+        and stability of the walk along the branch, from the pitchfork (included) on, shape (points,); and unit of the
+        values in messages. AnalysisError if the walks beside the pitchfork are not stable or do not tighten as the
+        parameter falls, so that no spring sets the radius of a turn."""
         values, radii, stable = np.asarray(values, float), np.asarray(radii, float), np.asarray(stable, bool)
         curvature = np.where(np.isfinite(radii), 1.0 / radii, 0.0)
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
@@ -77,13 +67,7 @@ class RadiusLaw(ReadOnlyArrays):
         return float(self.radii[0])
 
     def radius(self, value: float) -> float:
-        """Radius at a value of the parameter (SI units), m; infinite from the pitchfork on.
-
-        Raises
-        ------
-        ParameterError
-            Below the range of the law.
-        """
+        """Radius at a value of the parameter (SI), m; infinite from the pitchfork on, ParameterError below the law."""
         if value >= self.pitchfork:
             return float("inf")
         if not value >= self.values[0]:
@@ -94,13 +78,7 @@ class RadiusLaw(ReadOnlyArrays):
         return float(1.0 / np.sqrt(self._squared_curvature(value)))
 
     def value(self, radius: float) -> float:
-        """Value of the parameter (SI units) that gives a radius (m): the paper's k1-hat.
-
-        Raises
-        ------
-        AnalysisError
-            If no value within the law gives the radius.
-        """
+        """Value of the parameter (SI) that gives a radius (m), the paper's k1-hat; AnalysisError if none does."""
         from scipy.optimize import brentq
 
         if not radius >= self.tightest:

@@ -41,11 +41,9 @@ class Verdict(Labelled):
 
 @dataclass(frozen=True)
 class Judged:
-    """Masks of the robots, shape (robots,), whose target ended at a look of :class:`CourseReferee`.
-
-    They have ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or no longer walk,
-    which ends all their targets (``gone``). Others have had no target yet (``begins``).
-    """
+    """Masks of the robots, shape (robots,), whose target ended at a look of :class:`CourseReferee`. They have
+    ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or no longer walk, which ends
+    all their targets (``gone``). Others have had no target yet (``begins``)."""
 
     arrived: NDArray[np.bool_]
     late: NDArray[np.bool_]
@@ -154,8 +152,7 @@ class CourseReferee:
         return self._aims.copy()
 
     def time_left(self, now: float) -> Array:
-        """Time to the end of the last target's patience if no target is reached, s, shape (robots,); 0 for finished
-        robots."""
+        """Time to the end of the last patience if no target is reached, s, shape (robots,); 0 for finished robots."""
         begin = np.where(np.isnan(self._since), now, self._since)
         until = begin + self._common.patience * (self._counts - np.maximum(self._number, 0))
         return np.where(self.busy, until - now, 0.0)

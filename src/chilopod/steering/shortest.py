@@ -21,24 +21,10 @@ _HAIR = 1e-12
 
 
 def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) -> Array:
-    """Length of the shortest path to within the arrival radius of a position.
-
-    Parameters
-    ----------
-    place
-        Distances ahead and to the left, m, shape (..., 2).
-    radius, arrival
-        Radius of the tightest circle, m, 0 for a robot that turns on the spot; distance that counts as arrived, m.
-
-    Returns
-    -------
-    Length, m, shape (...); 0 within the arrival radius, NaN for a position that is not finite.
-
-    Raises
-    ------
-    ParameterError
-        If one of the radii is negative, not a number, or too large.
-    """
+    """Length of the shortest path to within the arrival radius of a position, m, shape (...); 0 within it, NaN for a
+    position that is not finite. ParameterError if one of the radii is negative, not a number, or too large. The place
+    is distances ahead and to the left, m, shape (..., 2), the radius that of the tightest circle, m, 0 for a robot that
+    turns on the spot, and the arrival the distance that counts as arrived, m."""
     for name, value in (("turning radius", radius), ("arrival radius", arrival)):
         if not 0.0 <= value <= FARTHEST:
             allowed = f"from 0, at most {FARTHEST:g} m"
@@ -60,8 +46,7 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
 
 def _to_disc(x: Array, y: Array, radius: float, arrival: float) -> Array:
     """Length to a disc that is not outside of the circle on its side: arcs that run into it, the straight line to its
-    centre where it is outside, and the best point of its rim.
-    """
+    centre where it is outside, and the best point of its rim."""
 
     def to_rim(directions: Array) -> Array:
         return _to_point(x[:, None] + arrival * np.cos(directions), y[:, None] + arrival * np.sin(directions), radius)

@@ -74,16 +74,9 @@ class SpringLaw(ReadOnlyArrays):
 
     @classmethod
     def of(cls, robot: Robot, law: RadiusLaw) -> SpringLaw:
-        """Build the law of a robot from its size, its springs, the actuator of the first one, and its radius law.
-
-        The range of the spring goes from that of the tightest walk of the radius law to the stiffest of the axis,
-        within the limits of the actuator.
-
-        Raises
-        ------
-        ParameterError
-            If the actuator leaves no range.
-        """
+        """Build the law of a robot from its size, its springs, the actuator of the first one, and its radius law. The
+        range of the spring goes from that of the tightest walk of the radius law to the stiffest of the axis, within
+        the limits of the actuator. ParameterError if the actuator leaves no range."""
         own = robot.springs
         softest = max(float(law.values[0]), own.softest[0] if own.softest else 0.0)
         stiffest = min(max(own.stiffness), own.stiffest[0] if own.stiffest else np.inf)
@@ -93,29 +86,20 @@ class SpringLaw(ReadOnlyArrays):
             allowed = "the softest below the stiffest, and below the stiffest spring of the axis"
             raise ParameterError(problem, field=names, value=f"{low} to {high}", allowed=allowed)
         curvatures = np.where(np.isfinite(law.radii), 1.0 / law.radii, 0.0)
-        return cls(
-            softest,
-            stiffest,
-            curvatures[::-1],
-            law.values[::-1],
-            law.radius(softest) if softest < law.pitchfork else law.tightest,
-            (robot.body.modules - 1) * robot.module_length,
-            _AHEAD * robot.module_length,
-        )
+        tightest, length = law.radius(softest) if softest < law.pitchfork else law.tightest, robot.module_length
+        arm, ahead = (robot.body.modules - 1) * length, _AHEAD * length
+        return cls(softest, stiffest, curvatures[::-1], law.values[::-1], tightest, arm, ahead)
 
     def remarks(self, law: RadiusLaw) -> list[str]:
         """Remarks on the radii that the robot's actuator cannot reach."""
         found = []
-        softest, stiffest, pitchfork = (
-            units.format(each, law.unit, digits=4) for each in (self.softest, self.stiffest, law.pitchfork)
-        )
+        springs = self.softest, self.stiffest, law.pitchfork
+        softest, stiffest, pitchfork = (units.format(each, law.unit, digits=4) for each in springs)
         if self.softest >= law.pitchfork:
             found.append(f"the softest first spring, {softest}, does not bend the straight walk; {pitchfork} does")
         elif self.softest > law.values[0]:
-            found.append(
-                f"the softest first spring, {softest}, gives circles of {self.tightest:.3g} m; tighter ones, "
-                f"down to {law.tightest:.3g} m, are out of reach"
-            )
+            tighter = f"tighter ones, down to {law.tightest:.3g} m, are out of reach"
+            found.append(f"the softest first spring, {softest}, gives circles of {self.tightest:.3g} m; {tighter}")
         if self.stiffest <= law.pitchfork:
             found.append(f"the stiffest first spring, {stiffest}, does not keep the walk straight; {pitchfork} does")
         return found
@@ -140,9 +124,8 @@ class SpringLaw(ReadOnlyArrays):
         # Ratio of the bend to the desired one; negative to the wrong side.
         share = bend * np.sign(wanted) / np.maximum(np.abs(wanted), self.straight)
         steady = np.clip(np.interp(np.abs(curvature), self.curvatures, self.springs), self.softest, self.stiffest)
-        spring = np.where(
-            share < 1.0 - self.band, self.softest, np.where(share < 1.0 + self.band, steady, self.stiffest)
-        )
+        spring = np.where(share < 1.0 + self.band, steady, self.stiffest)
+        spring = np.where(share < 1.0 - self.band, self.softest, spring)
         straightens = (share < 0.0) | (np.abs(wanted) < self.straight)
         straightens |= np.abs(seen.joint_angles).max(axis=1) > self.most_bent
         return np.where(straightens, self.stiffest, spring)
@@ -158,5 +141,4 @@ class SpringLaw(ReadOnlyArrays):
         """True if the tightest circle leads around the target and never to it."""
         radius = self.tightest
         ahead, aside = seen.distance * np.cos(seen.bearing), np.abs(seen.distance * np.sin(seen.bearing))
-        inside: NDArray[np.bool_] = np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS
-        return inside
+        return np.asarray(np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS)

@@ -16,8 +16,7 @@ from chilopod.steering.spring_law import SpringLaw
 
 
 class Prepared(NamedTuple):
-    """Robot with a strategy's springs and actuators, controller of its walk, None without one, and remarks on both, a
-    sentence each."""
+    """Robot with a strategy's springs and actuators, controller of its walk or None, and sentences about both."""
 
     robot: Robot
     controller: Controller | None
@@ -50,19 +49,12 @@ class Strategy:
     """True if the controller commands torques of the joints."""
 
     def check(self, spring: float | None) -> None:
-        """Refuse a spring that the strategy does not choose, and a missing spring that it needs.
-
-        Raises
-        ------
-        ParameterError
-            If the strategy does not accept the spring, or needs one.
-        """
+        """Refuse, with a ParameterError, a spring that the strategy does not choose, and lack of one that it needs."""
         if self.springs is not None and spring is None:
             raise ParameterError(f"strategy {self.name} needs one stiffness, such as 15 N*mm/deg", field="k1")
         if self.springs is None and spring is not None:
-            raise ParameterError(
-                f"must not be given: strategy {self.name} sets its own springs", field="k1", value=spring
-            )
+            problem = f"must not be given: strategy {self.name} sets its own springs"
+            raise ParameterError(problem, field="k1", value=spring)
 
     def fitted(self, robot: Robot, spring: float | None = None) -> tuple[Robot, tuple[str, ...]]:
         """Robot with the strategy's springs and actuators, and remarks on it."""
@@ -80,22 +72,9 @@ class Strategy:
         spring: float | None = None,
         controller: Controller | None = None,
     ) -> Prepared:
-        """Prepare a robot for a walk.
-
-        Parameters
-        ----------
-        robot, law
-            Robot, and its radius law for strategies with ``needs_law``.
-        spring
-            Stiffness for strategies with ``springs``, N*m/rad.
-        controller
-            Controller in place of the strategy's, which then needs no law.
-
-        Raises
-        ------
-        ParameterError
-            If the strategy does not accept spring, law or actuators.
-        """
+        """Prepare a robot for a walk, with its radius law for strategies with ``needs_law``, a spring, N*m/rad, for
+        those with ``springs``, or a controller in place of the strategy's, which then needs no law. ParameterError if
+        the strategy does not accept spring, law or actuators."""
         walker, remarks = self.fitted(robot, spring)
         if controller is not None:
             return Prepared(walker, controller, remarks)
@@ -179,13 +158,7 @@ def check_strategy(strategy: object) -> None:
 
 
 def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
-    """Return a strategy of :data:`STRATEGIES`, or of other strategies, by its name.
-
-    Raises
-    ------
-    ParameterError
-        For an unknown name.
-    """
+    """Return a strategy of :data:`STRATEGIES`, or of others, by its name; ParameterError for an unknown one."""
     if name not in among:
         nearest, allowed = nearest_name(name, among), ", ".join(among)
         others = [task for task, own in (("turn", STRATEGIES), ("course", ON_COURSES)) if name in own]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import units
-from chilopod.errors import ParameterError, UnitError
+from chilopod.errors import ParameterError, concerning
 
 ARRIVAL_RADIUS = 0.15
 """Distance within which the paper counts the target as reached, m."""
@@ -22,7 +22,8 @@ _FORM = 'a direction and a distance, such as "45 deg, 1.3 m"'
 
 @dataclass(frozen=True)
 class Target:
-    """Target relative to module 1 before the walk.
+    """Target relative to module 1 before the walk; ParameterError for one within the arrival radius, behind the robot,
+    or too far.
 
     Attributes
     ----------
@@ -30,11 +31,6 @@ class Target:
         Direction relative to the heading, left positive, rad, within a right angle.
     distance
         Distance from the centre of module 1, m, more than :data:`ARRIVAL_RADIUS`.
-
-    Raises
-    ------
-    ParameterError
-        For a target within the arrival radius, behind the robot, or too far.
     """
 
     bearing: float
@@ -51,26 +47,17 @@ class Target:
 
     @classmethod
     def parse(cls, text: str) -> Target:
-        """Read ``"45 deg, 1.3 m"``.
-
-        Raises
-        ------
-        ParameterError, UnitError
-            For any other text, or a target out of range.
-        """
+        """Read ``"45 deg, 1.3 m"``; ParameterError or UnitError for any other text, or a target out of range."""
         bearing, comma, distance = text.partition(",")
         if not comma:
             raise ParameterError("must be a target", field="target", value=text, allowed=_FORM)
-        try:
-            return cls(units.parse(bearing, "rad"), units.parse(distance, "m"))
-        except UnitError as error:
-            error.field = "target"
-            raise
+        with concerning("target"):
+            numbers = units.parse(bearing, "rad"), units.parse(distance, "m")
+        return cls(*numbers)
 
     @property
     def radius(self) -> float:
-        """Radius of the circle that starts along the heading and ends at the target, R / (2 |sin psi|), m; infinite
-        for a target straight ahead."""
+        """Radius of the circle along the heading to the target, R / (2 |sin psi|), m; infinite straight ahead."""
         sine = abs(math.sin(self.bearing))
         return self.distance / (2.0 * sine) if sine > 0.0 else math.inf
 

@@ -5,13 +5,24 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
-    from chilopod.tasks.course import Driven, Driver, drive, driver
-    from chilopod.tasks.identify import Identification, TwinIdentification, identify_planar, identify_twin
-    from chilopod.tasks.radius_law import radius_law
-    from chilopod.tasks.sizing import size
-    from chilopod.tasks.sizing.result import Sizing
-    from chilopod.tasks.turn import Turn, turn
-    from chilopod.tasks.walk import Ends, RunOptions, Walks, ends, walk
+    from chilopod.tasks.course import Driven as Driven
+    from chilopod.tasks.course import Driver as Driver
+    from chilopod.tasks.course import drive as drive
+    from chilopod.tasks.course import driver as driver
+    from chilopod.tasks.identify import Identification as Identification
+    from chilopod.tasks.identify import TwinIdentification as TwinIdentification
+    from chilopod.tasks.identify import identify_planar as identify_planar
+    from chilopod.tasks.identify import identify_twin as identify_twin
+    from chilopod.tasks.radius_law import radius_law as radius_law
+    from chilopod.tasks.sizing import Sizing as Sizing
+    from chilopod.tasks.sizing import size as size
+    from chilopod.tasks.turn import Turn as Turn
+    from chilopod.tasks.turn import turn as turn
+    from chilopod.tasks.walk import Ends as Ends
+    from chilopod.tasks.walk import RunOptions as RunOptions
+    from chilopod.tasks.walk import Walks as Walks
+    from chilopod.tasks.walk import ends as ends
+    from chilopod.tasks.walk import walk as walk
 else:
     __getattr__, __dir__ = exports(
         __name__,
@@ -19,30 +30,8 @@ else:
             "course": ("Driven", "Driver", "drive", "driver"),
             "identify": ("Identification", "TwinIdentification", "identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
-            "sizing": ("size",),
-            "sizing.result": ("Sizing",),
+            "sizing": ("Sizing", "size"),
             "turn": ("Turn", "turn"),
             "walk": ("Ends", "RunOptions", "Walks", "ends", "walk"),
         },
     )
-
-__all__ = [
-    "Driven",
-    "Driver",
-    "Ends",
-    "Identification",
-    "RunOptions",
-    "Sizing",
-    "Turn",
-    "TwinIdentification",
-    "Walks",
-    "drive",
-    "driver",
-    "ends",
-    "identify_planar",
-    "identify_twin",
-    "radius_law",
-    "size",
-    "turn",
-    "walk",
-]

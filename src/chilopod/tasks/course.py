@@ -59,8 +59,7 @@ class Driver(Short):
     remarks: tuple[str, ...] = ()
 
     def trial(self, course: Course, seed: int = 0, *, poses: bool = False, brief: bool = False) -> Trial:
-        """Trial of a course, with the disturbance of all studies; the robot's tightest circle replaces that of the
-        course if it is known."""
+        """Trial of a course, with the disturbance of all studies, and with the robot's tightest circle if known."""
         if not isinstance(course, Course):
             allowed = 'a Course, such as chilopod.steering.course_named("slalom", 40.0)'
             raise ParameterError("must be a course", field="course", value=course, allowed=allowed)
@@ -71,8 +70,7 @@ class Driver(Short):
 
 @dataclass(frozen=True)
 class Driven(Pathed):
-    """Walks along a course by a driver, with their trials and records, each up to its end, see
-    :func:`chilopod.steering.add_measures`."""
+    """Walks along a course by a driver; records up to the end of each, see :func:`chilopod.steering.add_measures`."""
 
     driver: Driver
     records: tuple[xr.Dataset, ...]
@@ -123,11 +121,9 @@ class Driven(Pathed):
         below = [f"{verdict}: {words}" for verdict, words in missed.items() if verdict != Verdict.ARRIVED.label]
         if len(walks) == 1:
             (walk,) = walks
-            below.append(
-                f"{walk['arrived']} of {goals} targets in {walk['time_s']:.1f} s; work {walk['spring_work_J']:.3g} J "
-                f"on springs, {walk['drive_work_J']:.3g} J by drives; steering's part of the cost of transport "
-                f"{_shown(walk['steering_cost_of_transport'])}"
-            )
+            work = f"work {walk['spring_work_J']:.3g} J on springs, {walk['drive_work_J']:.3g} J by drives"
+            part = f"steering's part of the cost of transport {_shown(walk['steering_cost_of_transport'])}"
+            below.append(f"{walk['arrived']} of {goals} targets in {walk['time_s']:.1f} s; {work}; {part}")
             return above, _of_targets(walk["targets"]), below
         reached = [walk["arrived"] for walk in walks]
         whole = f"{reached.count(goals)} of {len(walks)} courses whole"
@@ -136,9 +132,8 @@ class Driven(Pathed):
 
 
 def _of_targets(goals: list[dict[str, Any]]) -> list[Sequence[str]]:
-    rows: list[Sequence[str]] = [
-        ("target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)")
-    ]
+    head = "target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)"
+    rows: list[Sequence[str]] = [head]
     for number, goal in enumerate(goals, 1):
         cells = ["-"] * 5  # of a target that was never set
         if goal["path_m"]:
@@ -150,9 +145,8 @@ def _of_targets(goals: list[dict[str, Any]]) -> list[Sequence[str]]:
 
 
 def _of_walks(walks: list[dict[str, Any]], goals: int) -> list[Sequence[str]]:
-    rows: list[Sequence[str]] = [
-        ("seed", "targets", "time (s)", "springs (J)", "drives (J)", "cost of transport", "status")
-    ]
+    head = "seed", "targets", "time (s)", "springs (J)", "drives (J)", "cost of transport", "status"
+    rows: list[Sequence[str]] = [head]
     for walk in walks:
         seed = "-" if walk["seed"] is None else str(walk["seed"])
         works = [f"{walk[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]
@@ -205,6 +199,9 @@ def driver(
 ) -> Driver:
     """Prepare a robot for courses.
 
+    ParameterError or AnalysisError if the strategy needs a spring and has none, or has one and needs none; if the
+    spring has no actuator; if the strategy needs the pitchfork and the robot has none.
+
     Parameters
     ----------
     robot, strategy
@@ -215,12 +212,6 @@ def driver(
         As for :func:`chilopod.tasks.radius_law`.
     controller, law
         Controller in place of the strategy's, and radius law if already computed.
-
-    Raises
-    ------
-    ParameterError, AnalysisError
-        If the strategy needs a spring and has none, or has one and needs none; if the spring has no actuator; if the
-        strategy needs the pitchfork and the robot has none.
     """
     check_strategy(strategy)
     strategy.fitted(robot, spring)  # refuses wrong arguments before the slow law

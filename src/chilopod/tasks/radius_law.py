@@ -51,19 +51,10 @@ def radius_law(
 
     An engine whose walks are those of the planar theory has the law of the exact branch, from the softest spring on
     that a robot with a straight start withstands (:func:`that_holds`). The law of any other engine is measured in
-    undisturbed walks that start bent; springs at which these fail are left out.
+    undisturbed walks that start bent; springs at which these fail are left out. The robot's own first spring does not
+    matter; folder and progress are those of :class:`chilopod.tasks.RunOptions`.
 
-    Parameters
-    ----------
-    robot, engine
-        Robot, whose first spring does not matter, and name of an engine.
-    folder, progress
-        As for :class:`chilopod.tasks.RunOptions`.
-
-    Raises
-    ------
-    AnalysisError
-        If there is no such branch, fewer than three springs curve, or softer springs do not curve more tightly.
+    AnalysisError if there is no such branch, fewer than three springs curve, or softer ones do not curve more tightly.
     """
     if engine_named(engine).traits.exact:
         return that_holds(radius_laws(robot, progress).axis, robot, engine)
@@ -89,12 +80,10 @@ def bent(robot: Robot, engine: str = "planar", cycles: float = CYCLES) -> Trial:
 
 
 def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:
-    """Part of a radius law whose circles a robot reaches from a straight start.
-
-    A robot bends farther on its way into a circle than on the circle, and feet differ, so that a joint may leave its
-    range although it does not in the settled walk. The softest spring of the result is the first at which no joint does
-    in :data:`HELD` walks with the disturbance of all studies. Raises AnalysisError if no spring remains.
-    """
+    """Part of a radius law whose circles a robot reaches from a straight start. A robot bends farther on its way into a
+    circle than on the circle, and feet differ, so that a joint may leave its range although it does not in the settled
+    walk. The softest spring of the result is the first at which no joint does in :data:`HELD` walks with the
+    disturbance of all studies. Raises AnalysisError if no spring remains."""
     for first, value in enumerate(law.values[:-2].tolist()):
         walker = robot.with_value(K1, value)
         ends = run([Trial(walker, CYCLES * robot.gait.period, seed, rate=1.0, engine=engine) for seed in range(HELD)])
@@ -104,11 +93,8 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
 
 
 def end_of_walk(record: xr.Dataset, robot: Robot, earlier: float = 10.0) -> xr.Dataset:
-    """Measures at the end of one trial's record. Times are those of the paper's robot; in others they are as many gait
-    cycles.
+    """Measures at the end of one trial's record. Times are those of the paper's robot; others take as many gait cycles.
 
-    Returns
-    -------
     Dataset over joint: ``mean_angle``, ``axis_radius`` (m) and ``status`` of :class:`chilopod.trials.WalkSummary`;
     ``bend``, the sum of the sizes of the mean angles (rad); ``direction`` (left, right, straight; empty where the walk
     failed, or has no mean angles); ``moved``, the difference of the bend from that of the ``earlier`` s before (rad),

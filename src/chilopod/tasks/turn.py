@@ -91,21 +91,16 @@ class Turn(Pathed):
 
     def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         found, radius = self.criteria, self.target.radius
-        above = [
-            f"{self.strategy.name}: {self.strategy.sentence}",
-            f"the circle to the target has a radius of {radius:.3f} m"
-            if np.isfinite(radius)
-            else "the circle to the target is a straight line",
-        ]
+        circle = f"has a radius of {radius:.3f} m" if np.isfinite(radius) else "is a straight line"
+        above = [f"{self.strategy.name}: {self.strategy.sentence}", f"the circle to the target {circle}"]
         springs = {"by the settled radius (the paper's k1-hat)": self.by_law, "walked with": self.stiffness}
         for name, spring in springs.items():
             if spring is not None:
                 above.append(f"spring {name}: {units.format(spring, 'N*mm/deg', digits=4)}")
         measures = "distance left, angle and effort (the paper's epsilon 1 to 3)"
         above.append(f"{measures} at {found.time:.2f} s; nearest at any time")
-        rows: list[Sequence[str]] = [
-            ("seed", "outcome", "arrival (s)", "nearest (m)", "left (m)", "angle (deg)", "effort (rad2 s)")
-        ]
+        head = "seed", "outcome", "arrival (s)", "nearest (m)", "left (m)", "angle (deg)", "effort (rad2 s)"
+        rows: list[Sequence[str]] = [head]
         for i, (label, outcome) in enumerate(zip(self.labels, found.outcome, strict=True)):
             arrival = f"{found.arrival[i]:.2f}" if np.isfinite(found.arrival[i]) else "never"
             nearest, left, effort = f"{found.nearest[i]:.4f}", f"{found.distance[i]:.3f}", f"{found.effort[i]:.4f}"
@@ -124,7 +119,7 @@ def turn(
     controller: Controller | None = None,
     **options: Unpack[RunOptions],
 ) -> Turn:
-    """Walk to a target.
+    """Walk to a target; AnalysisError if no spring turns tightly enough.
 
     Parameters
     ----------
@@ -141,11 +136,6 @@ def turn(
         As for :class:`chilopod.trials.Trial`; the controller replaces that of the strategy.
     **options
         See :class:`chilopod.tasks.RunOptions`; the folder has the trials of the radius law and of the search too.
-
-    Raises
-    ------
-    AnalysisError
-        If no spring turns tightly enough.
     """
     check_strategy(strategy)
     if spring not in ("auto", "law") and isinstance(spring, str):
@@ -189,8 +179,7 @@ def _with_spring(trial: Trial, strategy: Strategy, stiffness: float | None) -> T
 
 
 def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float], folder: str | Path | None) -> float:
-    """Spring of a strategy that comes nearest to the target, by undisturbed trials on successively finer grids,
-    N*m/rad."""
+    """Spring of a strategy that comes nearest to the target, N*m/rad, by undisturbed trials on ever finer grids."""
     low, high = between
     tried = engine_named(trial.engine).traits.walks_per_round
     trial = replace(trial, disturbance=NONE, rate=20.0, poses=False)

@@ -28,16 +28,9 @@ _MOST = 12  # walks that are drawn in a notebook
 
 
 class RunOptions(TypedDict, total=False):
-    """Options of every task with walks: seeds, repeats, folder and progress.
-
-    Attributes
-    ----------
-    seed, repeats
-        Seed of the first walk's disturbances, from which the others count up, None (default) for no disturbance; and
-        number of walks, by default 1.
-    folder, progress
-        Folder that keeps all trials, if any; function of the fraction done (0 to 1) and a few words.
-    """
+    """Options of every task with walks: ``seed`` of the first walk's disturbances, from which the others count up, None
+    (default) for no disturbance; ``repeats``, the number of walks, by default 1; ``folder`` that keeps all trials, if
+    any; and ``progress``, a function of the fraction done (0 to 1) and a few words."""
 
     seed: int | None
     repeats: int
@@ -219,20 +212,9 @@ def walk(
     controller: Controller | None = None,
     **options: Unpack[RunOptions],
 ) -> Walks:
-    """Simulate one walk of a robot, or several.
-
-    Parameters
-    ----------
-    robot, duration, joint_angles, rate, forces, engine, controller
-        As for :class:`chilopod.trials.Trial`.
-    **options
-        See :class:`chilopod.tasks.RunOptions`.
-
-    Raises
-    ------
-    ParameterError
-        If a value is out of range, or memory cannot hold the record, which :func:`ends` does not need.
-    """
+    """Simulate one walk of a robot, or several, with the arguments of :class:`chilopod.trials.Trial` and
+    :class:`chilopod.tasks.RunOptions`. ParameterError if a value is out of range, or memory cannot hold the record,
+    which :func:`ends` does not need."""
     bends = tuple(joint_angles)
     one = Trial(robot, duration, 0, bends, controller=controller, rate=rate, forces=forces, engine=engine)
     trials, records = runs(one, **options)

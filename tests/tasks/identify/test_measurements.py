@@ -100,14 +100,14 @@ def test_measurements_of_known_effect(found):
 def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch):
     # Where a range would be found from rounded numbers it is nothing, and everything from scattered ones.
     monkeypatch.setattr(check, "_fitted", lambda robot, data: (data, np.zeros(3)))
-    monkeypatch.setattr(check, "allowed_ranges", lambda robot, data, best: (np.full((3, 2), np.nan), None))
+    monkeypatch.setattr(planar_fit, "allowed_ranges", lambda robot, data, best: (np.full((3, 2), np.nan), None))
     seen = []
 
     def everything(robot, data, best):
         seen.append(data)
         return np.tile([0.0, np.inf], (3, 1)), None
 
-    monkeypatch.setattr(check, "confidence_intervals", everything)
+    monkeypatch.setattr(planar_fit, "confidence_intervals", everything)
     assert check.rounded(DATA.model_copy(update={"k1": 1.02 * DATA.k1})) == DATA
     both, first = self_test(ROBOT, DATA, 2, seed=3), self_test(ROBOT, DATA, 1, seed=3)
     np.testing.assert_array_equal(both.true[:1], first.true)

@@ -173,7 +173,7 @@ def test_a_profile_ends_where_no_pitchfork_is_left(monkeypatch):
         gone = robot.get("legs.forward_offset") > BEST[2] + 0.002
         return nothing if gone else np.full(6, 0.5)
 
-    monkeypatch.setattr(planar, "least_largest", fitted)
+    monkeypatch.setattr(planar_fit, "least_largest", fitted)
     monkeypatch.setattr(planar, "residuals", off)
     monkeypatch.setattr(planar, "_predictions", lambda robot, variants: planar._no_predictions(variants))
     span = BEST[2] + np.array([-0.01, 0.01])

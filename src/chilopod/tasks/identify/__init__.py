@@ -5,12 +5,22 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
-    from chilopod.tasks.identify.check import SelfTest, self_test
-    from chilopod.tasks.identify.data import TEMPLATES, BaseSeries, CriticalMode, RecordedWalks, load_data
-    from chilopod.tasks.identify.measurements import Measurement, NextMeasurements, next_measurements
-    from chilopod.tasks.identify.planar import Identification, identify_planar
-    from chilopod.tasks.identify.trajectories import RecordedIdentification, identify_recorded
-    from chilopod.tasks.identify.twin import TwinIdentification, identify_twin
+    from chilopod.tasks.identify.check import SelfTest as SelfTest
+    from chilopod.tasks.identify.check import self_test as self_test
+    from chilopod.tasks.identify.data import TEMPLATES as TEMPLATES
+    from chilopod.tasks.identify.data import BaseSeries as BaseSeries
+    from chilopod.tasks.identify.data import CriticalMode as CriticalMode
+    from chilopod.tasks.identify.data import RecordedWalks as RecordedWalks
+    from chilopod.tasks.identify.data import load_data as load_data
+    from chilopod.tasks.identify.measurements import Measurement as Measurement
+    from chilopod.tasks.identify.measurements import NextMeasurements as NextMeasurements
+    from chilopod.tasks.identify.measurements import next_measurements as next_measurements
+    from chilopod.tasks.identify.planar import Identification as Identification
+    from chilopod.tasks.identify.planar import identify_planar as identify_planar
+    from chilopod.tasks.identify.trajectories import RecordedIdentification as RecordedIdentification
+    from chilopod.tasks.identify.trajectories import identify_recorded as identify_recorded
+    from chilopod.tasks.identify.twin import TwinIdentification as TwinIdentification
+    from chilopod.tasks.identify.twin import identify_twin as identify_twin
 else:
     __getattr__, __dir__ = exports(
         __name__,
@@ -23,22 +33,3 @@ else:
             "twin": ("TwinIdentification", "identify_twin"),
         },
     )
-
-__all__ = [
-    "TEMPLATES",
-    "BaseSeries",
-    "CriticalMode",
-    "Identification",
-    "Measurement",
-    "NextMeasurements",
-    "RecordedIdentification",
-    "RecordedWalks",
-    "SelfTest",
-    "TwinIdentification",
-    "identify_planar",
-    "identify_recorded",
-    "identify_twin",
-    "load_data",
-    "next_measurements",
-    "self_test",
-]

@@ -15,18 +15,10 @@ from chilopod.notebook import Shown, aligned
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.statistics import LEVEL
+from chilopod.tasks.identify import planar_fit
 from chilopod.tasks.identify.constants import CONFIDENCE
 from chilopod.tasks.identify.data import CriticalMode
-from chilopod.tasks.identify.planar_fit import (
-    FREE,
-    allowed_ranges,
-    best_of,
-    confidence_intervals,
-    fits_from_every_start,
-    scale_of,
-    searched,
-    with_constants,
-)
+from chilopod.tasks.identify.planar_fit import FREE, scale_of
 
 _SIZES, _BESIDE = 3.0, 1.25  # largest factor of length, mass and springs, and of the constants
 _DRAWS = 100
@@ -42,8 +34,7 @@ class SelfTest(Shown):
     intervals: Array
 
     def as_json(self) -> dict[str, Any]:
-        """Number of robots whose constant is covered, and the share that this number allows (Clopper and Pearson), by
-        the kind of numbers and the constant."""
+        """Count of robots whose constant is covered, and interval of that share (Clopper, Pearson), by kind, path."""
         found: dict[str, Any] = {"robots": len(self.true), "rounded": {}, "scattered": {}}
         for kind, ends in (("rounded", self.ranges), ("scattered", self.intervals)):
             covered = (ends[..., 0] <= self.true) & (self.true <= ends[..., 1])
@@ -67,25 +58,22 @@ class SelfTest(Shown):
 
 def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progress: Progress = silent) -> SelfTest:
     """Identify the constants of robots that are made up around a robot. Each depends on ``seed`` and its number alone.
-
     Length, mass and springs differ by factors of a third to three, and constants in units of the robot by factors of
     0.8 to 1.25. Each is identified from its critical spring and mode rounded to twice the tolerances of the data, and
-    once more from ones that scatter normally with the tolerances as standard errors. AnalysisError if no such robot has
-    a pitchfork.
-    """
+    once more from ones with these as standard errors of normal scatter. AnalysisError if none has a pitchfork."""
     true, ranges, intervals = [], [], []
     for number in range(count):
         rng = np.random.default_rng([seed, number])
         other, constants, exact = made_up(robot, data, rng)
         true.append(constants)
-        ranges.append(allowed_ranges(other, *_fitted(other, rounded(exact)))[0])
-        intervals.append(confidence_intervals(other, *_fitted(other, scattered(exact, rng)))[0])
+        ranges.append(planar_fit.allowed_ranges(other, *_fitted(other, rounded(exact)))[0])
+        intervals.append(planar_fit.confidence_intervals(other, *_fitted(other, scattered(exact, rng)))[0])
         progress((number + 1) / count, f"self-test, robot {number + 1} of {count}")
     return SelfTest(np.array(true), np.array(ranges), np.array(intervals))
 
 
 def _fitted(robot: Robot, data: CriticalMode) -> tuple[CriticalMode, Array]:
-    return data, best_of(fits_from_every_start(robot, data))[0]
+    return data, planar_fit.best_of(planar_fit.fits_from_every_start(robot, data))[0]
 
 
 def made_up(robot: Robot, data: CriticalMode, rng: np.random.Generator) -> tuple[Robot, Array, CriticalMode]:
@@ -101,7 +89,7 @@ def made_up(robot: Robot, data: CriticalMode, rng: np.random.Generator) -> tuple
         sizes = {name: spring * getattr(data, name) for name in ("k1", "k1_tolerance")}
         exact = data.model_copy(update={**sizes, "between": tuple(spring * each for each in data.between)})
         constants = groups * _BESIDE ** rng.uniform(-1.0, 1.0, len(FREE)) * scale_of(other, exact)
-        found = searched(with_constants(other, constants), exact.between)
+        found = planar_fit.searched(planar_fit.with_constants(other, constants), exact.between)
         if found is not None:
             return other, constants, exact.model_copy(update={"k1": found[0], "components": tuple(found[1].tolist())})
     raise AnalysisError("must have neighbours with a pitchfork", field="robot", value=robot.name)

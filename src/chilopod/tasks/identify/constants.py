@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from chilopod import units
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ParameterError, concerning
 from chilopod.frozen import Array
 from chilopod.notebook import Summary
 from chilopod.robot import Robot
@@ -30,8 +30,7 @@ _STEP = 1e-6  # of differences, in parts of ranges
 
 @dataclass(frozen=True)
 class Constant:
-    """Free constant: its path in the robot's description and the ends of its range, SI; with ``per``, the range is
-    that of its ratio to an earlier constant."""
+    """Free constant: its path and the ends of its range, SI, with ``per`` that of its ratio to an earlier constant."""
 
     path: str
     low: float
@@ -46,10 +45,8 @@ class Constant:
 
 @dataclass(frozen=True)
 class FreeConstants:
-    """The constants that are fitted, in an order, with their ranges.
-
-    Parts of the ranges are numbers from 0 to 1, shape (constants,); values are in SI units.
-    """
+    """The constants that are fitted, in an order, with their ranges. Parts of the ranges are numbers from 0 to 1, shape
+    (constants,); values are in SI units."""
 
     each: tuple[Constant, ...]
 
@@ -64,11 +61,8 @@ class FreeConstants:
             raise ParameterError("must be a table of paths of a robot's numbers, each with a range", value=given)
         found: list[Constant] = []
         for name, ends in given.items():
-            try:
+            with concerning(f"[{name}]"):
                 found.append(_constant(str(name), ends, [each.path for each in found]))
-            except ChilopodError as error:
-                error.field = f"[{name}]"
-                raise
         return cls(tuple(found))
 
     @property
@@ -82,10 +76,8 @@ class FreeConstants:
 
     def values_at(self, parts: Sequence[float] | Array) -> Array:
         """Values at parts of the ranges."""
-        pairs = zip(self.each, parts, strict=True)
-        values = np.array(
-            [c.low * (c.high / c.low) ** x if c.logarithmic else c.low + x * (c.high - c.low) for c, x in pairs]
-        )
+        ends = ((c.low, c.high, c.logarithmic, x) for c, x in zip(self.each, parts, strict=True))
+        values = np.array([a * (b / a) ** x if even else a + x * (b - a) for a, b, even, x in ends])
         for index, other in self._ratios():
             values[index] *= values[other]
         return values
@@ -120,8 +112,7 @@ class FreeConstants:
         return np.array([robot.get(path) for path in self.paths])
 
     def check(self, robot: Robot) -> None:
-        """ParameterError if two constants change one number, or the robot cannot have them at the ends of their
-        ranges."""
+        """ParameterError if two constants change one number, or the robot cannot have the ends of their ranges."""
         taken: set[str] = set()
         for path in self.paths:
             if both := taken & (numbers := {*robot.numbers(path)}):
@@ -160,24 +151,11 @@ def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of free constants.
-
-    Attributes
-    ----------
-    given, free
-        Robot with the constants that are not free, and the free ones with their ranges.
-    values, ends
-        Best value of each constant, shape (constants,), and ends of its 90 % interval, shape (constants, 2), SI, NaN
-        where none is found.
-    spread
-        Covariance of the constants, SI, for half of a 90 % interval in place of a standard deviation, shape (constants,
-        constants); NaN where it is not known.
-    remark
-        Words that the provenance of each constant ends with.
-    cut
-        Mask of the ends that lie where another constant is at the end of its range, shape (constants, 2); by default
-        none.
-    """
+    """Estimates of the ``free`` constants of a robot, ``given`` with those that are not. ``values`` are the best, shape
+    (constants,), and ``ends`` those of their 90 % intervals, shape (constants, 2), SI, NaN where none is found.
+    ``spread`` is their covariance, SI, for half of a 90 % interval in place of a standard deviation, shape (constants,
+    constants), NaN where it is not known. Provenances end with the ``remark``. ``cut`` is a mask of the ends that lie
+    where another constant is at the end of its range, shape (constants, 2)."""
 
     given: Robot
     free: FreeConstants
@@ -218,10 +196,9 @@ class Estimates:
             squares, directions = np.linalg.eigh(self.spread / np.outer(scale, scale))
             signs = np.where(directions.sum(axis=0) < 0.0, -1.0, 1.0)
             for change in (signs * np.sqrt(np.abs(squares)) * directions).T:
+                changes = dict(zip(paths, change.tolist(), strict=True))
                 is_open = bool((np.abs(change) * scale > _OPEN * widths).any())
-                found["combinations"].append(
-                    {"changes": dict(zip(paths, change.tolist(), strict=True)), "open": is_open}
-                )
+                found["combinations"].append({"changes": changes, "open": is_open})
         return found
 
     def _constant(self, at: int, ends: Array) -> dict[str, Any]:

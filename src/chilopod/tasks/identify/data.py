@@ -93,12 +93,8 @@ class _Measured(Quantity):
 
 
 # Without an effect on walks of the twin that nothing steers.
-_UNREAD = (
-    "ground.",
-    "twin.scanner",
-    "twin.pole",
-    *(f"springs.{each}" for each in ("softest", "stiffest", "rate", "lag")),
-)
+_ACTUATED = ("springs.softest", "springs.stiffest", "springs.rate", "springs.lag")
+_UNREAD = ("ground.", "twin.scanner", "twin.pole", *_ACTUATED)
 _Free = Annotated[FreeConstants, BeforeValidator(FreeConstants.read)]
 
 
@@ -190,13 +186,11 @@ class BaseSeries(Description):
             point = 1.0 / self.onset[0]
             law = joints * robot.module_length / radius / np.sqrt(1.0 / spring - point), point
         bend = law[0] * np.sqrt(np.maximum(1.0 / np.array(springs) - law[1], 0.0))
-        angles: Array = np.maximum(bend, _LEAST_BEND)[:, None] * shape
-        return angles
+        return np.asarray(np.maximum(bend, _LEAST_BEND)[:, None] * shape)
 
 
 def load_data(path: str | Path, *kinds: type[Description]) -> Any:
-    """Read a TOML file of data of one of some kinds, see :data:`TEMPLATES`; RobotFileError, in one line,
-    names the fault."""
+    """Read a TOML file of data of one of some kinds, see :data:`TEMPLATES`; RobotFileError names the fault."""
     table, source = parsed(read_text(path, "file of data", RobotFileError), str(path)), str(path)
     known: list[type[Description]] = [*kinds, CriticalMode, RecordedWalks, BaseSeries]  # of kinds alike, the first
     kind = max(known, key=lambda kind: len({*kind.model_fields} & {*table}))

@@ -36,8 +36,7 @@ _CHANGES = {ALL: (0.5, 0.7, 1.5), "gait.stride": (0.6, 1.5), "gait.stance": (1.5
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measurement that could be made: its name, its numbers as a function of a robot with certain constants, SI, and
-    their tolerance, relative to them or absolute."""
+    """A measurement that could be made: its name, its numbers, SI, of a robot, and their tolerance, relative or SI."""
 
     name: str
     of: Callable[[Robot], Array] = field(repr=False)
@@ -48,11 +47,8 @@ class Measurement:
 @dataclass(frozen=True)
 class NextMeasurements(Shown):
     """Measurements, that which would leave least of the volume of the free constants first, and measurements that could
-    not be predicted, with the reason.
-
-    ``rows`` have, of each ``measurement``, its ``tolerance``, its numbers and their tolerances (``predicted_si``,
-    ``tolerances_si``), and the parts that it would leave of the volume and of the range of each constant.
-    """
+    not be predicted, with the reason. ``rows`` have, of each ``measurement``, its ``tolerance``, its numbers and their
+    tolerances (``predicted_si``, ``tolerances_si``), and what it would leave of the volume and of each range."""
 
     rows: list[dict[str, Any]]
     left_out: dict[str, str]

@@ -29,23 +29,10 @@ from chilopod.notebook import axes_for, finite
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
+from chilopod.tasks.identify import planar_fit
 from chilopod.tasks.identify.constants import Estimates, Identified
 from chilopod.tasks.identify.data import CriticalMode
-from chilopod.tasks.identify.planar_fit import (
-    FREE,
-    NONE,
-    allowed_ranges,
-    best_of,
-    confidence_intervals,
-    fits_from_every_start,
-    free_constants,
-    least_largest,
-    no_pitchfork,
-    residuals,
-    scale_of,
-    spread,
-    with_constants,
-)
+from chilopod.tasks.identify.planar_fit import FREE, residuals, with_constants
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +77,7 @@ class Identification(Identified):
     def groups(self) -> dict[str, list[float | None]]:
         """Groups without unit that the critical spring and its mode depend on: value of the best constants, least and
         greatest value that the data allow, None where they allow none."""
-        found = np.column_stack([self.constants, self.ranges]) / scale_of(self.given, self.data)[:, None]
+        found = np.column_stack([self.constants, self.ranges]) / planar_fit.scale_of(self.given, self.data)[:, None]
         found[0] = 0.25 / found[0, [0, 2, 1]]
         names = "k1/(friction*speed*duty*module_length)", "half_width/module_length", "forward_offset/module_length"
         return {name: [*map(finite, row)] for name, row in zip(names, found.tolist(), strict=True)}
@@ -98,7 +85,7 @@ class Identification(Identified):
     @property
     def estimates(self) -> Estimates:
         """The constants with their intervals."""
-        free = free_constants(self.given, self.data)
+        free = planar_fit.free_constants(self.given, self.data)
         remark = "; no constants meet all data" if np.isnan(self.ranges).any() else ""
         return Estimates(self.given, free, self.constants, self.intervals, self.spread, remark, self.cut[1])
 
@@ -128,7 +115,7 @@ class Identification(Identified):
 
     def _remarks(self) -> list[str]:
         searched = []
-        for each in free_constants(self.given, self.data).each:
+        for each in planar_fit.free_constants(self.given, self.data).each:
             ends = (units.format(end, self.given.unit_of(each.path), 3) for end in (each.low, each.high))
             searched.append(f"{each.path} {' to '.join(ends)}")
         said = [f"ranges searched: {', '.join(searched)}"]
@@ -162,12 +149,12 @@ def identify_planar(
     """Fit the constants of a robot to the data, with a profile of so many ``points``. Each predicts the critical k1 of
     ``variants``, settings of the robot by name. AnalysisError if the robot has another number of modules than the data,
     or no pitchfork with any constants."""
-    fits = fits_from_every_start(robot, data, progress)
-    best = best_of(fits)
-    ranges, cut = allowed_ranges(robot, data, best[0])
+    fits = planar_fit.fits_from_every_start(robot, data, progress)
+    best = planar_fit.best_of(fits)
+    ranges, cut = planar_fit.allowed_ranges(robot, data, best[0])
     progress(0.4, "ranges")
     explained = (best[1] ** 2).sum() <= chi2.ppf(_LIKELY, max(best[1].size - len(FREE), 1))
-    intervals, also_cut = confidence_intervals(robot, data, best[0]) if explained else NONE
+    intervals, also_cut = planar_fit.confidence_intervals(robot, data, best[0]) if explained else planar_fit.NONE
     return Identification(
         given=robot,
         data=data,
@@ -178,7 +165,7 @@ def identify_planar(
         ranges=ranges,
         intervals=intervals,
         cut=np.array([cut, also_cut]),
-        spread=(1.0 if explained else np.nan) * spread(robot, data, best[0]),
+        spread=(1.0 if explained else np.nan) * planar_fit.spread(robot, data, best[0]),
         profile=_profile(robot, data, best[0], ranges[2], points, variants, progress),
     )
 
@@ -204,9 +191,9 @@ def _profile(
         for index in direction:
             found, constants = _no_predictions(variants), np.full(len(FREE), np.nan)
             if not lost:
-                last = constants = least_largest(robot, data, np.append(last[:2], offsets[index]))
+                last = constants = planar_fit.least_largest(robot, data, np.append(last[:2], offsets[index]))
                 off = residuals(with_constants(robot, constants), data)
-                lost, largest = np.array_equal(off, no_pitchfork(data)), float(np.abs(off).max())
+                lost, largest = np.array_equal(off, planar_fit.no_pitchfork(data)), float(np.abs(off).max())
             if not lost:
                 found = _predictions(with_constants(robot, constants), variants)
             fitted = {"friction": constants[0], "half_width": constants[1], "largest_residual": largest}

@@ -108,8 +108,7 @@ def _maps(robots: list[Robot]) -> Array:
     symmetry, period = models[0].symmetry, models[0].period
     if symmetry is None:
         return PlanarModel.flow_many(models, 0.0, period)[0]
-    maps: Array = symmetry @ PlanarModel.flow_many(models, 0.0, 0.5 * period)[0]
-    return maps
+    return np.asarray(symmetry @ PlanarModel.flow_many(models, 0.0, 0.5 * period)[0])
 
 
 class _LostError(Exception):
@@ -191,8 +190,7 @@ def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
 
 
 def allowed_ranges(robot: Robot, data: CriticalMode, best: Array) -> Ends:
-    """Projections of the set {max |residual| <= 1}; NaN if it is empty. Where no end is found, the search ends the
-    range."""
+    """Projections of the set {max |residual| <= 1}; NaN if it is empty, ends of the search where none is found."""
 
     def largest(constants: Array) -> float:
         return float(np.abs(residuals(with_constants(robot, constants), data)).max())
@@ -219,11 +217,9 @@ def _ends(
     robot: Robot, data: CriticalMode, start: Array, room: Callable[[Array], Any], slope: Callable[[Array, Array], Array]
 ) -> Ends:
     """Ends of a set that contains some constants; NaN where none is found. In the set no component of
-    ``room(residuals)`` is negative; ``slope(residuals, their derivatives)`` is its derivative.
-
-    The set is a curved valley, so each end is searched from that of the ends before which is nearest to it too. The
-    residuals at an end are searched anew. It lies on the edge of the set or of the search.
-    """
+    ``room(residuals)`` is negative; ``slope(residuals, their derivatives)`` is its derivative. The set is a curved
+    valley, so each end is searched from that of the ends before which is nearest to it too. The residuals at an end are
+    searched anew. It lies on the edge of the set or of the search."""
     off, scale, limits = _Residuals(robot, data), scale_of(robot, data), np.array(_BOUNDS)
     within = {"fun": lambda x: room(off.watched(x)), "jac": lambda x: slope(off(x), off.jacobian(x))}
     ends = np.full((len(FREE), 2, len(FREE)), np.nan)
@@ -291,8 +287,7 @@ def spread(robot: Robot, data: CriticalMode, best: Array) -> Array:
 
 
 def fits_from_every_start(robot: Robot, data: CriticalMode, progress: Progress = silent) -> list[tuple[Array, Array]]:
-    """Constants by least squares, SI, and their residuals, from every starting point; AnalysisError if the robot has no
-    pitchfork there."""
+    """Constants by least squares, SI, and residuals, from every start; AnalysisError if none has a pitchfork."""
     _check(robot, data)
     fits = []
     for index, start in enumerate(_STARTS):

@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import units
-from chilopod.errors import ChilopodError, ParameterError, RobotFileError
+from chilopod.errors import ChilopodError, ParameterError, RobotFileError, concerning
 from chilopod.frozen import Array
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
@@ -49,12 +49,9 @@ def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Rec
     data.free.check(robot)
     robots = []
     for at, each in enumerate(data.trajectory):
-        try:
+        with concerning(within=f"trajectory.{at}.settings"):
             robots.append(own := robot.set_from_text(each.settings))
             fixed = {number for text in each.settings for number in own.numbers(text.partition("=")[0].strip())}
-        except ChilopodError as error:
-            error.field = f"trajectory.{at}.settings {error.field or ''}".strip()
-            raise
         for path in data.free.paths:
             if fixed.issuperset(own.numbers(path)):
                 raise ParameterError("must not be a setting of a walk too", field=f"free[{path}]")
@@ -67,7 +64,7 @@ def read_recordings(robot: Robot, data: RecordedWalks, folder: Path) -> list[Rec
 
 
 def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Recording:
-    try:
+    with concerning(source=str(path)):
         if path.suffix.lower() in (".nc", ".nc4"):
             data = _netcdf(path)
             _check_settings(robot, data, free)
@@ -91,9 +88,6 @@ def _read(given: Trajectory, robot: Robot, path: Path, free: set[str]) -> Record
             said = f"too short for this robot, which forgets the rates at its start within {forgotten:.3g} s only"
             raise ParameterError(said, value=f"{times[-1]:.4g} s", allowed=f"{2.0 * forgotten:.3g} s or more")
         return Recording(given.file, given.settings, forgotten, times, angles)
-    except ChilopodError as error:
-        error.source = str(path)
-        raise
 
 
 def _forgotten(model: PlanarModel) -> float:
@@ -137,10 +131,7 @@ def _check_settings(robot: Robot, data: xr.Dataset, free: set[str]) -> None:
         own = Robot.from_toml(data.attrs["robot"])
         recorded = {path: np.array(own.get(path)) for path in own.parameters() if path.startswith("gait.")}
         springs = np.moveaxis(data["stiffness"].values, data["stiffness"].get_axis_num("joint"), 0)
-        recorded |= {
-            f"springs.stiffness[{at}]": values
-            for at, values in zip(range(robot.body.modules - 1), springs, strict=False)
-        }
+        recorded |= {f"springs.stiffness[{at}]": each for at, each in enumerate(springs[: robot.body.modules - 1])}
     for path, values in recorded.items():
         if path.partition("[")[0] not in free and not np.allclose(values, robot.get(path), rtol=1e-6, atol=0.0):
             ends, unit = np.unique([values.min(), values.max()]).tolist(), robot.unit_of(path)

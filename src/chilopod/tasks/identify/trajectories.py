@@ -89,11 +89,8 @@ class RecordedIdentification(Identified):
 def identify_recorded(
     robot: Robot, data: RecordedWalks, folder: str | Path, progress: Progress = silent
 ) -> RecordedIdentification:
-    """Fit the free constants of a robot to recorded walks from files in a folder.
-
-    Intervals are those of linear residuals with the scatter that is left. Directions that the data leave open end near
-    the constants of the robot. Errors are those of :func:`read_recordings`.
-    """
+    """Fit the free constants of a robot to recorded walks from files in a folder, with intervals of linear residuals.
+    Directions that the data leave open end near the robot's constants. Errors are those of :func:`read_recordings`."""
     walks = _Walks(robot, data.free, read_recordings(robot, data, Path(folder)))
     unknown, count = _fit(walks, progress), len(data.free.each)
     measured = [each.angles for each in walks.recordings]
@@ -126,8 +123,7 @@ class _Walks:
         self.given: Array = np.clip(free.parts_of(free.of(robot)), 0.0, 1.0)
 
     def computed(self, frees: Array) -> list[Array]:
-        """Angles of each walk, rad, NaN at samples that do not count, shape (samples, sets, N-1), with sets of
-        unknowns, shape (sets, unknowns)."""
+        """Angles of each walk, rad, NaN where they do not count, (samples, sets, N-1), for (sets, unknowns)."""
         count, starts = self.given.size, np.split(frees[:, self.given.size :], len(self.recordings), axis=1)
         out = []
         for one, start in zip(self.recordings, starts, strict=True):

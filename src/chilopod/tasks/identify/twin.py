@@ -62,8 +62,7 @@ _MOST_CONFIRMED = 20
 
 @dataclass(frozen=True)
 class Fit:
-    """One set of constants, in parts of their ranges, its residuals, and its weight in the valley, 0 if it is no sample
-    of it."""
+    """One set of constants, in parts of their ranges, its residuals, and its weight in the valley, 0 if not in it."""
 
     parts: Array
     residuals: Array
@@ -76,8 +75,7 @@ class Fit:
 
     @property
     def objective(self) -> float:
-        """Sum of the squared residuals and of the squared distances of the constants from the middle of their ranges,
-        over a quarter of the ranges."""
+        """Sum of squared residuals and squared distances of the constants from mid-range, over a quarter of ranges."""
         return float(np.sum(self.residuals**2) + np.sum(((self.parts - 0.5) / PRIOR) ** 2))
 
 
@@ -206,26 +204,17 @@ def known(free: FreeConstants = FITTED) -> list[Fit]:
     """Sets of constants included in chilopod, with the residuals of the paper's series and their weights; those of
     ``FITTED`` begin with the preset's. The others are of ``WITH_FRICTION``."""
     name = "twin" if free is FITTED else "friction"
-    shipped = json.loads(files("chilopod.tasks.identify").joinpath(f"{name}_fits.json").read_text(encoding="utf-8"))
-    return [
-        Fit(free.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in shipped["fits"]
-    ]
+    shipped = files("chilopod.tasks.identify").joinpath(f"{name}_fits.json").read_text(encoding="utf-8")
+    fits = json.loads(shipped)["fits"]
+    return [Fit(free.parts_of(each["constants"]), np.array(each["residuals"]), each["weight"]) for each in fits]
 
 
 def confirmed(robot: Robot, data: BaseSeries) -> bool:
     """True if walks from a straight start agree with the data: at the stiffest curved spring most of them curve, to
     both sides, and at the softest straight spring most of them stay straight."""
-    trials = [
-        Trial(
-            robot.with_value(K1, spring),
-            CYCLES * robot.gait.period,
-            seed,
-            rate=SAMPLES / robot.gait.period,
-            engine="twin",
-        )
-        for spring in (max(data.curved), min(data.straight))
-        for seed in range(_TRIALS)
-    ]
+    period, robots = robot.gait.period, [robot.with_value(K1, k) for k in (max(data.curved), min(data.straight))]
+    how: dict[str, Any] = {"rate": SAMPLES / period, "engine": "twin"}
+    trials = [Trial(each, CYCLES * period, seed, **how) for each in robots for seed in range(_TRIALS)]
     ends = xr.concat([end_of_walk(record, robot) for record in run(trials)], "trial")
     sides = ends.direction.values.reshape(2, _TRIALS)
     bent = np.isin(sides, ("left", "right")).sum(axis=1)
@@ -247,8 +236,7 @@ def search(
     ``starts`` are evaluated first, in parts of the ranges, and some that are spread evenly if there are few; ``counts``
     are the numbers of evaluations, these among them, and of samples. Evaluations are kept in ``folder``; a stopped
     search resumes, because it repeats the same ones. Returns all evaluations, and the mean square error of the
-    surrogate at the samples over that which it expected. AnalysisError if the robot walks with none of the first
-    constants.
+    surrogate at the samples over that which it expected. AnalysisError if none of the first constants walks.
     """
     rng = np.random.default_rng(seed)
     trained = counts[0]
@@ -298,12 +286,9 @@ def identify_twin(
     progress: Progress = silent,
 ) -> TwinIdentification:
     """Identify the constants: a :func:`search` from the known sets, then the best of the good fits that reach the curve
-    from a straight start, like the robot.
-
-    The known sets serve if the free constants have theirs among them; other constants then begin as in the robot.
-    ``evaluations`` and ``samples`` are the numbers of evaluations that train the surrogate and of samples of the
-    valley; for the other arguments see :func:`search`.
-    """
+    from a straight start, like the robot. The known sets serve if the free constants have theirs among them; other
+    constants then begin as in the robot. ``evaluations`` and ``samples`` are the numbers of evaluations that train the
+    surrogate and of samples of the valley; for the other arguments see :func:`search`."""
     engine_named("twin").common(robot)  # refuses a robot without a twin
     free = data.free
     free.check(robot)

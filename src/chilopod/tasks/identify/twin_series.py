@@ -52,10 +52,8 @@ def base_series(
     duration: float = DURATION,
 ) -> Series:
     """Walk a series for a duration, s, from starts near the bends of its data, with a tolerance of the contact solver.
-    ``springs`` replace the values of k1, N*m/rad; ``engine`` is the twin or a :class:`chilopod.twin.Edited`.
-
-    Walks of all springs of the data stop after 36 s if they are far off by then.
-    """
+    ``springs`` replace the values of k1, N*m/rad; ``engine`` is the twin or a :class:`chilopod.twin.Edited`. Walks of
+    all springs of the data stop after 36 s if they are far off by then."""
     walks: Any = engine_named(engine)  # with arguments that only the twin has
     robots = [robot.with_value(K1, spring) for spring in springs or data.springs]
     initial = walks.initial_states(robot, data.start(robot, springs or data.springs))
@@ -82,12 +80,9 @@ def _series(walk: Walk, robot: Robot) -> Series:
 
 
 def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
-    """Residuals of a series: computed less the data, one number for each of ``data.names``.
-
-    These are radii, speeds and onset (each over its standard error); bend where the robot is straight beyond 0.1 rad
-    in all (over 0.05 rad); the deficit from 0.3 rad at the stiffest curved spring (over the same); motion between the
-    averages beyond 0.1 rad (over 0.1 rad).
-    """
+    """Residuals of a series: computed less the data, one number for each of ``data.names``. These are radii, speeds and
+    onset (each over its standard error); bend where the robot is straight beyond 0.1 rad in all (over 0.05 rad); the
+    deficit from 0.3 rad at the stiffest curved spring (the same); motion between averages beyond 0.1 rad (over 0.1)."""
     springs = data.springs
     summed = np.abs(found.bends).sum(-1)
     at = dict(zip(springs, summed, strict=True))

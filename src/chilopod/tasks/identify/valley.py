@@ -42,12 +42,9 @@ class Samples:
         return float(1.0 / np.sum(self.weights**2)) if len(self.weights) else 0.0
 
     def interval(self, values: Array) -> tuple[float, float]:
-        """Ends of the central interval that holds one more draw of a number with 90 %, from its values at the samples,
-        shape (samples,).
-
+        """Ends of the central interval that holds one more draw of a number with 90 %, from its values at the samples.
         The order statistics r and s of n draws hold one more with probability (s - r)/(n + 1), here with n the
-        effective number (Wilks 1941); below n = 19 the interval ends at the smallest and largest value.
-        """
+        effective number (Wilks 1941); below n = 19 the interval ends at the smallest and largest value."""
         order, n = np.argsort(values), self.effective
         middles = np.cumsum(self.weights[order]) - 0.5 * self.weights[order]
         beyond = 0.5 * (1.0 - CONFIDENCE) * (n + 1.0) / n - 0.5 / n
@@ -69,9 +66,8 @@ class _Process:
         likely = np.r_[_SCALES, np.full(parts.shape[1], _LENGTH)]
         bounds = [(-5.0, 4.0), (-5.0, 2.0), *[(-2.5, 4.0)] * parts.shape[1]]
         # Logarithms of deviation, noise and lengths that the values make most likely, with a weak prior.
-        self.scales = np.asarray(
-            minimize(self._unlikely, likely, (likely,), jac=True, bounds=bounds, options={"maxiter": _MOST_STEPS}).x
-        )
+        how = {"bounds": bounds, "options": {"maxiter": _MOST_STEPS}}
+        self.scales = np.asarray(minimize(self._unlikely, likely, (likely,), jac=True, **how).x)
         lower = cho_factor(self._covariance(parts, self.scales) + self._noise(self.scales), lower=True)[0]
         self._inverse = np.asarray(solve_triangular(lower, np.eye(len(parts)), lower=True))
         self._solved = self._inverse.T @ (self._inverse @ values)
@@ -108,8 +104,7 @@ class _Process:
 
 class Surrogate:
     """Gaussian processes of squashed residuals, shape (evaluations, residuals), over parts of the constants' ranges,
-    shape (evaluations, constants). Residuals that are the same in all evaluations are left out. Variances are
-    multiplied by ``excess``."""
+    shape (evaluations, constants), but of none that never changes. Variances are multiplied by ``excess``."""
 
     def __init__(self, parts: Array, residuals: Array, excess: float = 1.0) -> None:
         self._parts, self._excess = parts, excess

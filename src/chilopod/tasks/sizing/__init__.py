@@ -2,13 +2,15 @@
 
 :func:`size` reads wishes and ranges, lets a :class:`chilopod.tasks.sizing.search.Search` find the nearest robot, and
 asks it what stands in the way. The robot then walks from a bent start. A walk that does something else than what was
-computed changes the outcome. The result is a :class:`chilopod.tasks.sizing.result.Sizing`.
+computed changes the outcome. The result is a :class:`Sizing`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -16,18 +18,150 @@ import xarray as xr
 from chilopod import units
 from chilopod.analysis.map_axes import Axis, Given, axis
 from chilopod.analysis.quantities import QUANTITIES, Measured, Onset, leading_mode, unit_of
-from chilopod.errors import ChilopodError, ParameterError, known_names
+from chilopod.errors import ChilopodError, ParameterError, concerning, known_names
+from chilopod.frozen import Array, ReadOnlyArrays
+from chilopod.notebook import Summary, axes_for, finite
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
+from chilopod.stability.shown import bounded
 from chilopod.tasks.radius_law import CYCLES, PERIOD, bent, end_of_walk, is_curved
-from chilopod.tasks.sizing.result import Sizing
 from chilopod.tasks.sizing.search import Outcome, Search, Wish, parsed_wish
 from chilopod.trials import run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _AS_COMPUTED = 0.02  # largest relative deviation of radius and speed of a planar walk from those computed
 _SETTLED = 15.0  # settling times of a walk
 _MOST = 1500.0  # gait cycles of a walk, 15 minutes of the paper's robot
 _OF_ONSET = {"onset", "margin", "friction", "work", "coefficient"}
+
+
+@dataclass(frozen=True, eq=False)
+class Sizing(Summary, ReadOnlyArrays):
+    """A robot that does what is wished, or comes nearest to it if one has every wished quantity.
+
+    Attributes
+    ----------
+    robot, source
+        The robot, with provenance that says what was computed and what was copied; name of that which it is made from.
+    wishes, onset, values
+        Wishes, the number that bends the robot, and the wished quantities, SI, shape (wishes,), NaN without one.
+    free, numbers, bound
+        Ranges of the free numbers, their values, SI, shape (numbers,), and the bound on the error of a root, or NaN.
+    outcome, reasons
+        Outcome; sentences about what stands in the way, and about the onset if a wish depends on it.
+    front
+        Pareto front of two conflicting wishes: free numbers, then quantities, SI, shape (points, numbers + wishes).
+    walks
+        Ends of a walk by the name of the engine, see :func:`chilopod.tasks.radius_law.end_of_walk`.
+    evaluations
+        Number of evaluations of robots; a branch of curved walks counts as 20.
+    """
+
+    robot: Robot
+    source: str
+    wishes: tuple[Wish, ...]
+    onset: Onset
+    values: Array
+    free: tuple[Axis, ...]
+    numbers: Array
+    bound: float
+    outcome: Outcome
+    reasons: tuple[str, ...]
+    front: Array
+    walks: dict[str, xr.Dataset]
+    evaluations: int
+
+    @property
+    def title(self) -> str:
+        """Robot and outcome."""
+        return f"{self.source}: {self.outcome.sentence}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers, SI; null for missing values."""
+        paths, wished = [each.path for each in self.free], [each.quantity for each in self.wishes]
+        front = [(row[: len(paths)], map(finite, row[len(paths) :])) for row in self.front.tolist()]
+        return {
+            "robot": self.source,
+            "outcome": self.outcome.label,
+            "numbers_si": dict(zip(paths, self.numbers.tolist(), strict=True)),
+            "error_bound_si": finite(self.bound),
+            "ranges_si": {each.path: [each.low, each.high] for each in self.free},
+            "wishes": [
+                {**asdict(wish), "found": finite(value), "walked": {k: self._walked(wish, k) for k in self.walks}}
+                for wish, value in zip(self.wishes, self.values.tolist(), strict=True)
+            ],
+            "walks": {
+                name: {key: str(end[key].item()) for key in ("status", "direction")}
+                | {"settled": bool(end.settled) if is_curved(end) else None}
+                for name, end in self.walks.items()
+            },
+            "reasons": list(self.reasons),
+            "front_si": [
+                {"numbers": dict(zip(paths, x, strict=True)), "values": dict(zip(wished, y, strict=True))}
+                for x, y in front
+            ],
+            "evaluations": self.evaluations,
+        }
+
+    def _walked(self, wish: Wish, engine: str) -> float | None:
+        name = {"radius": "axis_radius", "speed": "speed"}.get(wish.quantity)
+        end = self.walks[engine]
+        return finite(float(end[name])) if name and (name == "speed" or is_curved(end)) else None
+
+    def _shown(self, wish: Wish, value: float | None) -> str:
+        unit = unit_of(wish.quantity, self.robot, self.onset)
+        return "-" if value is None or np.isnan(value) else units.format(value, unit, digits=5)
+
+    def _content(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        cells: list[Sequence[str]] = [("", "range or wish", "found", *(f"{name} walk" for name in self.walks))]
+        for each, value in zip(self.free, self.numbers.tolist(), strict=True):
+            low, high, found = (units.format(number, each.unit, digits=6) for number in (each.low, each.high, value))
+            if np.isfinite(self.bound):
+                shown, error = (units.from_si(number, each.unit) for number in (value, self.bound))
+                found = f"{bounded(shown, error)} {each.unit}"
+            cells.append((each.path, f"{low} to {high}", found, *[""] * len(self.walks)))
+        for wish, value in zip(self.wishes, self.values.tolist(), strict=True):
+            wished = {0: "", -1: "at most ", 1: "at least "}[wish.sense] + self._shown(wish, wish.value)
+            walked = (self._shown(wish, self._walked(wish, name)) for name in self.walks)
+            cells.append((wish.quantity, wished, self._shown(wish, value), *walked))
+        below = [f"the {name} walk {_direction(end)}" for name, end in self.walks.items()]
+        for row in self.front.tolist():
+            numbers, values = row[: len(self.free)], row[len(self.free) :]
+            met = (f"{w.quantity} {self._shown(w, v)}" for w, v in zip(self.wishes, values, strict=True))
+            at = (units.format(v, a.unit, digits=4) for a, v in zip(self.free, numbers, strict=True))
+            below.append(f"on the Pareto front: {', '.join(met)} at {', '.join(at)}")
+        return [], cells, [*self.reasons, *below]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the free numbers within their ranges; where wishes conflict, their Pareto front."""
+        axes = axes_for(axes)
+        if len(self.front):
+            values = self.front[:, len(self.free) :]
+            pair = np.argsort(-np.ptp(values, axis=0))[:2]  # the two that conflict
+            wishes = [self.wishes[i] for i in pair]
+            shown = [unit_of(wish.quantity, self.robot, self.onset) for wish in wishes]
+            points = [*values[:, pair].tolist(), [wish.value for wish in wishes]]
+            x, y = np.array([list(map(units.from_si, point, shown)) for point in points]).T
+            axes.plot(x[:-1], y[:-1], "o-")
+            axes.plot(x[-1], y[-1], "x", color="C3", label="wish")
+            labels = [f"{wish.quantity} ({unit})".removesuffix(" ()") for wish, unit in zip(wishes, shown, strict=True)]
+            axes.set(xlabel=labels[0], ylabel=labels[1])
+            axes.legend()
+        else:
+            low, high = (np.array([getattr(each, name) for each in self.free]) for name in ("low", "high"))
+            axes.barh([each.path for each in self.free], (self.numbers - low) / (high - low))
+            axes.set(xlim=(0.0, 1.0), xlabel="place in the range")
+        axes.set_title(self.source)
+        return axes
+
+
+def _direction(end: xr.Dataset) -> str:
+    direction = str(end.direction.item())
+    if direction in ("", "straight"):
+        return "goes straight" if direction else f"ends: {end.status.item()}"
+    return f"turns {direction}{'' if end.settled else ', not settled yet'}"
 
 
 def size(
@@ -43,6 +177,9 @@ def size(
 ) -> Sizing:
     """Find the values of free numbers at which a robot does what is wished, and let it walk.
 
+    ParameterError if a wish or a range is not one, or two of the ranges change the same number; AnalysisError if a
+    curved walk is wished, and none leaves the straight one with this gait.
+
     Parameters
     ----------
     robot, onset
@@ -57,15 +194,6 @@ def size(
     budget, seed
         Most evaluations of robots, some 20 ms each, one half in the search and one to say what stands in the way; a
         branch of curved walks counts as 20. Seed of the scattered starts.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
-
-    Raises
-    ------
-    ParameterError
-        If a wish or a range is not one, or two of the ranges change the same number.
-    AnalysisError
-        If a curved walk is wished, and none leaves the straight one with this gait.
     """
     names = known_names([*wishes], QUANTITIES, "wishes")
     given = tuple(parsed_wish(robot, onset, name, wishes[name]) for name in names)
@@ -113,11 +241,8 @@ def _axes(robot: Robot, free: Sequence[Given]) -> tuple[Axis, ...]:
             raise ParameterError(said, field=f"free {each.path}", value=each.path)
         taken |= each.numbers(robot)
         for end in (each.low, each.high):
-            try:
+            with concerning(f"free {each.path}"):
                 each.change(robot, end)
-            except ChilopodError as error:
-                error.field = f"free {each.path}"
-                raise
     if not axes:
         raise ParameterError("must name a number with its range", field="free", value="nothing")
     return axes

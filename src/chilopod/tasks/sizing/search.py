@@ -30,7 +30,7 @@ from chilopod import units
 from chilopod.analysis.branch import NO_PAIR
 from chilopod.analysis.map_axes import Axis
 from chilopod.analysis.quantities import QUANTITIES, TOO_BENT, Measured, Onset, leading_mode
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError, concerning
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
 from chilopod.planar import PlanarModel
@@ -114,15 +114,12 @@ class Wish:
 
 def parsed_wish(robot: Robot, onset: Onset, name: str, given: float | str) -> Wish:
     """A wish from its value, SI or text; ParameterError names the fault."""
-    try:
+    with concerning(name):
         sense = {"<": -1, ">": 1}.get(given[:1], 0) if isinstance(given, str) else 0
         unit = robot.si_unit_of(onset.parameter) if name == "onset" else QUANTITIES[name]
         value = units.parse(given[abs(sense) :].removeprefix("="), unit) if isinstance(given, str) else float(given)
         if not np.isfinite(value) or (name in ("radius", "speed", "settling") and value <= 0.0):
             raise ParameterError("must be finite, and positive for a radius, a speed or a time", value=given)
-    except ChilopodError as error:
-        error.field = name
-        raise
     return Wish(name, value, sense)
 
 
@@ -172,10 +169,8 @@ class Search:
 
     def numbers(self, place: Array) -> Array:
         """Free numbers at a place in the unit cube, SI, evenly by their logarithm where they are positive."""
-        parts = zip(self.axes, np.round(place, 15).tolist(), strict=True)
-        return np.array(
-            [a.low * (a.high / a.low) ** p if a.low > 0.0 else a.low + (a.high - a.low) * p for a, p in parts]
-        )
+        parts = ((a.low, a.high, part) for a, part in zip(self.axes, np.round(place, 15).tolist(), strict=True))
+        return np.array([a * (b / a) ** part if a > 0.0 else a + (b - a) * part for a, b, part in parts])
 
     def at(self, place: Array) -> Robot:
         """Robot at a place in the unit cube."""
@@ -290,8 +285,7 @@ class Search:
         return place, self.deviations(place)
 
     def bound(self) -> float:
-        """Bound on the error of a root, SI: by its deviation in another computation, and the slope there; NaN if the
-        number does not change the wish."""
+        """Bound on the error of a root, SI, by its deviation computed anew; NaN if the number changes nothing."""
         if not self._changed:
             return np.nan
         (wish,), step, robot, again = self.wishes, 1e-5, self.at(self.best), self.again
@@ -362,8 +356,7 @@ class Search:
         return min(tried, key=lambda found: float(norm(weights * found[1])))
 
     def _front(self, pair: Sequence[int], ends: Sequence[tuple[Array, Array]], start: Array) -> list[Array]:
-        """Places that no other found one surpasses in a wish of a pair and equals in the other: the best place, those
-        with either wish left out, and between."""
+        """Places, from the best to those with a wish of a pair left out, of which none surpasses another in both."""
         found = [start, *(ends[i][0] for i in pair)]
         # Each deviation counts relative to that where its own wish is left out.
         largest = [max(abs(ends[i][1][i]), _MET) for i in pair]
