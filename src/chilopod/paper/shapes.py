@@ -8,7 +8,6 @@ from typing import Any, Final, Literal
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.analysis.square_root import SquareRootFit
@@ -38,11 +37,6 @@ def finish(axes: Axes, grid: Literal["both", "x", "y"] = "both", legend: Any = N
         axes.legend(loc=legend)
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
-    """Legend of some axes below the whole figure."""
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns)
-
-
 def errorbars(
     axes: Axes, x: Array, y: Array, error: Array, color: str, marker: str, name: str = "", *, joined: bool = False
 ) -> None:
@@ -65,7 +59,7 @@ def _inverse(x: ArrayLike) -> Array:
     return 1.0 / np.maximum(np.asarray(x, dtype=np.float64), 1e-9)
 
 
-def draw_examples(axes: Mapping[str, Axes], examples: xr.Dataset, narrow: bool) -> None:
+def draw_examples(axes: style.Mosaic, examples: xr.Dataset) -> None:
     """Joint angles (deg) over time of a straight walk in A and of a curved one in B, on one scale."""
     for letter, what, spring in zip("AB", ("Straight", "Curved"), examples.spring.values, strict=True):
         for joint, (color, _) in zip(examples.joint.values, style.joint_styles(examples.sizes["joint"]), strict=True):
@@ -77,7 +71,7 @@ def draw_examples(axes: Mapping[str, Axes], examples: xr.Dataset, narrow: bool) 
     low, high = zip(*(axes[letter].get_ylim() for letter in "AB"), strict=True)
     for letter in "AB":
         axes[letter].set_ylim(min(low), max(high))
-    axes["A"].legend(loc="upper left", ncols=2 if narrow else 3)
+    axes["A"].legend(loc="upper left", ncols=2 if axes.narrow else 3)
 
 
 def draw_fork(

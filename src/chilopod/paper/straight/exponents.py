@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from chilopod.frozen import Array, ComplexArray
@@ -52,7 +51,7 @@ def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
         name="exponents",
         letter="B",
         title="Floquet exponents as k₁ falls",
-        draw=lambda narrow: _draw(data, value, narrow),
+        draw=_draw(data, value),
         alt=f"{count} Floquet exponents in the complex plane as the front spring falls from {first:g} to {last:g} "
         + f"{SPRING_UNIT}: "
         + ("one crosses into the right half-plane along the real axis." if critical is not None else "none crosses."),
@@ -121,8 +120,8 @@ def _between(start: ComplexArray, end: ComplexArray) -> tuple[Array, ComplexArra
     return share, between
 
 
-def _draw(data: xr.Dataset, crossing: float | None, narrow: bool) -> Figure:
-    figure, axes = style.figure(_WIDE, _NARROW, narrow)
+@style.in_layouts(_WIDE, _NARROW)
+def _draw(axes: style.Mosaic, data: xr.Dataset, crossing: float | None) -> None:
     critical = _critical(data)
     lead = critical if critical is not None else 0
     curves = ks, real, imaginary = _joined(data)
@@ -130,7 +129,7 @@ def _draw(data: xr.Dataset, crossing: float | None, narrow: bool) -> Figure:
     if critical is not None:
         colors = [*colors[:critical], style.VERMILLION, *colors[critical:-1]]
     _near(axes["A"], real, imaginary, lead, colors)
-    _labels(axes["A"], ks, real[:, lead], imaginary[:, lead], _MARKED[::2] if narrow else _MARKED)
+    _labels(axes["A"], ks, real[:, lead], imaginary[:, lead], _MARKED[::2] if axes.narrow else _MARKED)
     _all(axes["B"], curves, lead, colors)
     _over_k1(axes["C"], ks, real, lead, colors)
     if crossing is not None:
@@ -141,7 +140,6 @@ def _draw(data: xr.Dataset, crossing: float | None, narrow: bool) -> Figure:
         words = f"crosses at\nk₁ = {number(crossing, 4)}\n{SPRING_UNIT}"
         axes["A"].annotate(words, (0.0, 0.0), (14, 42), arrowprops=line, **look)
         axes["C"].annotate(number(crossing), (crossing, 0.0), (-6, 9), ha="right", **look)
-    return figure
 
 
 def _near(axes: Axes, real: Array, imaginary: Array, lead: int, colors: list[str]) -> None:

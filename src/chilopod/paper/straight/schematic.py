@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
@@ -35,7 +34,7 @@ def panel(robot: Robot) -> Panel:
         name="schematic",
         letter="A",
         title="The model",
-        draw=lambda narrow: _draw(robot, data, narrow),
+        draw=_draw(robot, data),
         alt=f"Top view of {robot.body.modules} modules in a row joined by {robot.body.modules - 1} sprung yaw joints, "
         f"one module enlarged with its measures, and a diagram of when each foot stands.",
         text=(
@@ -79,12 +78,11 @@ def legs(robot: Robot) -> xr.Dataset:
     )
 
 
-def _draw(robot: Robot, data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(_WIDE, _NARROW, narrow)
-    _whole(axes["A"], robot, data, narrow)
+@style.in_layouts(_WIDE, _NARROW)
+def _draw(axes: style.Mosaic, robot: Robot, data: xr.Dataset) -> None:
+    _whole(axes["A"], robot, data, axes.narrow)
     _one_module(axes["B"], robot)
     _gait(axes["C"], robot, data)
-    return figure
 
 
 def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:

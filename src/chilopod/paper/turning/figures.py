@@ -14,7 +14,7 @@ from matplotlib.patches import Arc, Circle
 from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.printed import CRITERION_NAMES
-from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, legend_below, over_compliance
+from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, over_compliance
 from chilopod.paper.statements import listed
 from chilopod.paper.turning.study import SCALES, Turning, all_lower, in_words, minima, saturation, softest_minima
 from chilopod.paper.turning.trials import (
@@ -33,11 +33,8 @@ from chilopod.show.scene.outline import draw_modules
 from chilopod.show.words import SPRING_UNIT, k, listing, number, spring, typeset
 from chilopod.steering import ARRIVAL_RADIUS, Outcome
 
-_TURNING = (style.Layout("AB;CD", 7.6, heights=(1.5, 1.0)), style.Layout("A;B;C;D", 12.6, heights=(1.0, 1.3, 0.9, 0.9)))
-_CRITERIA = (style.Layout("ABC", 3.9), style.Layout("A;B;C", 9.9))
 _WITHOUT = (style.Layout("AB", 4.0), style.Layout("A;B", 7.4))
 _WITHOUT_ONE = (style.Layout("A", 4.4), style.Layout("A", 4.2))
-_WHY = (style.Layout("AB", 4.0), style.Layout("A;B", 7.8))
 _SHOWN = (style.ORANGE, style.GREEN, style.BLUE)
 _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 _CURVES = tuple(zip(style.CURVES, _DASHES, strict=False))
@@ -62,7 +59,7 @@ def turning(found: Turning) -> Panel:
     return Panel(
         name="turning",
         title="Turning task A: a target ahead to the left",
-        draw=lambda narrow: draw_turning(found.robot, task, narrow),
+        draw=draw_turning(found.robot, task),
         alt=f"A circle from the robot to a target {away:g} m away at {psi:g} degrees; walks with three springs, "
         f"of which that with {number(best)} {SPRING_UNIT} comes nearest; distance and angle of the target over "
         "time.",
@@ -89,9 +86,11 @@ def usual_outcomes(task: TurningTask) -> str:
     return listing(f"most {what.label} with {spring(k, 2)}" for k in shown for what, those in by_outcome if k in those)
 
 
-def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
+@style.in_layouts(
+    style.Layout("AB;CD", 7.6, heights=(1.5, 1.0)), style.Layout("A;B;C;D", 12.6, heights=(1.0, 1.3, 0.9, 0.9))
+)
+def draw_turning(axes: style.Mosaic, robot: Robot, task: TurningTask) -> None:
     """Circle, paths, distance and angle of a task, as in the paper's Fig. "turning" A to D."""
-    figure, axes = style.figure(*_TURNING, narrow)
     _geometry(axes["A"], robot, *task.target.position)
     data, arrival = task.paths, task.criteria.arrival.sel(spring=task.paths.shown).values
     for row, (spring_, color) in enumerate(zip(data.shown.values, _SHOWN, strict=True)):
@@ -105,7 +104,7 @@ def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
     _floor(axes["B"], data)
     axes["B"].set_title("B  Path of module 1")
     look: dict[str, Any] = {"title": f"springs in {SPRING_UNIT}", "title_fontsize": style.SMALL}
-    figure.legend(*axes["B"].get_legend_handles_labels(), loc="outside lower center", ncols=3, **look)
+    axes.legend_below("B", 3, 3, **look)
     axes["C"].axhline(ARRIVAL_RADIUS, color=style.BLACK, lw=0.9, linestyle=DASHED)
     style.note(axes["C"], f"arrived, {ARRIVAL_RADIUS:g} m", (0.4, ARRIVAL_RADIUS), (0, 3), va="bottom")
     axes["C"].set(ylim=(0.0, 1.45), ylabel="target distance (m)", title="C  Distance of the target")
@@ -117,7 +116,6 @@ def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
         finish(axes[letter], xlim=(0.0, float(data.time[-1])), xlabel="time (s)")
     said = f"earliest arrival, {number(task.time)} s"
     style.note(axes["D"], said, (task.time, -250.0), (-4, 0), ha="right", va="center")
-    return figure
 
 
 def _run(axes: Axes, time: Array, x: Array, y: Array, until: float, color: str) -> None:
@@ -180,7 +178,7 @@ def criteria(found: Turning, letter: str) -> Panel:
         title="Task A: the paper's three criteria over the spring"
         if first
         else f"Task {letter} ({psi:g}°, {away:g} m): the criteria again",
-        draw=lambda narrow: draw_criteria(shown, narrow, _TOP, k_hat=law),
+        draw=draw_criteria(shown, _TOP, k_hat=law),
         alt="Distance, angle and leg yaw over the compliance of the first spring, smallest at "
         f"{listing(number(float(each), 2) for each in smallest)} {SPRING_UNIT}.",
         text=(
@@ -203,7 +201,7 @@ def comparison(found: Turning) -> Panel:
     return Panel(
         name="turning-hopf",
         title="Pitchfork against Hopf",
-        draw=lambda narrow: draw_comparison(task, found.hopf, narrow, _TOP_HOPF),
+        draw=draw_comparison(task, found.hopf, _TOP_HOPF),
         alt="The three criteria over the spring for the two strategies; the pitchfork's smallest values lie below.",
         text=(
             "The earlier strategy softens all springs together, so that the straight walk gives way to an undulation "
@@ -263,21 +261,25 @@ def walks_of(task: TurningTask) -> str:
     return f"mean of {task.criteria.sizes['repeat']} walks ± standard error"
 
 
-def draw_comparison(task: TurningTask, hopf: TurningTask, narrow: bool, top: Sequence[float]) -> Figure:
+def draw_comparison(task: TurningTask, hopf: TurningTask, top: Sequence[float]) -> style.Drawing:
     """The three criteria over 1/k of the two strategies, with springs to mark on the top axis."""
     shown = {"pitchfork: first spring alone": task, "Hopf: all springs alike": hopf}
-    return draw_criteria(shown, narrow, top, "k")
+    return draw_criteria(shown, top, "k")
 
 
+@style.in_layouts(style.Layout("ABC", 3.9), style.Layout("A;B;C", 9.9))
 def draw_criteria(
-    shown: Mapping[str, TurningTask], narrow: bool, top: Sequence[float], name: str = k(1), k_hat: float | None = None
-) -> Figure:
+    axes: style.Mosaic,
+    shown: Mapping[str, TurningTask],
+    top: Sequence[float],
+    name: str = k(1),
+    k_hat: float | None = None,
+) -> None:
     """The three criteria over 1/k of one or two tasks by their names, with some springs (N*mm/deg) on the top axis.
 
     With the spring of a radius law, ``k_hat`` (N*mm/deg), the springs that arrive are shaded; without it the lowest
     mean of the first task is marked.
     """
-    figure, axes = style.figure(*_CRITERIA, narrow)
     first = next(iter(shown.values()))
     arrived = springs_by_outcome(first.criteria)[Outcome.ARRIVED]
     for place, criterion in zip("ABC", CRITERION_NAMES, strict=True):
@@ -302,8 +304,7 @@ def draw_criteria(
         low, high = one.dataLim.y0, one.dataLim.y1
         one.set_ylim(*((0.95 * low, 1.02 * high) if criterion == "effort" else (0.0, None)))
         over_compliance(one, top, name)
-    legend_below(figure, axes["A"], 1 if narrow else 3)
-    return figure
+    axes.legend_below("A", 3)
 
 
 def without(found: Turning) -> Panel:
@@ -348,15 +349,15 @@ def sides(case: LegYaw) -> str:
 def draw_without(data: xr.Dataset, narrow: bool) -> Figure:
     """Paths with and without leg yaw, a panel for each spring."""
     cases = by_leg_yaw(data)
-    figure, axes = style.figure(*(_WITHOUT if len(cases) > 1 else _WITHOUT_ONE), narrow)
+    axes = style.Mosaic(*(_WITHOUT if len(cases) > 1 else _WITHOUT_ONE), narrow)
     for case, letter in zip(cases, "AB", strict=False):
         for walks, color, name in ((case.alone, style.ORANGE, "without"), (case.helped, style.GREEN, "with")):
             first, *_ = axes[letter].plot(walks.x.values.T, walks.y.values.T, color=color, lw=1.1)
             first.set_label(f"{name} leg yaw, {arrivals(walks)[1]} walks")
         _floor(axes[letter], data)
         axes[letter].set_title(f"{letter}  {case.name.capitalize()}, {number(case.spring, 3)} {SPRING_UNIT}")
-    legend_below(figure, axes["A"], 1 if narrow else 2)
-    return figure
+    axes.legend_below("A", 2)
+    return axes.figure
 
 
 def why(found: Turning) -> Panel:
@@ -372,7 +373,7 @@ def why(found: Turning) -> Panel:
     return Panel(
         name="turning-why",
         title="Why the best spring is not that of the radius law",
-        draw=lambda narrow: _draw_why(settled, farther, narrow),
+        draw=_draw_why(settled, farther),
         alt="How near the target comes at the spring of the law, starting straight and bent; and the leg yaw needed "
         "for targets at several distances over the spring.",
         text=(
@@ -399,8 +400,8 @@ def why(found: Turning) -> Panel:
     )
 
 
-def _draw_why(settled: xr.Dataset, farther: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_WHY, narrow)
+@style.in_layouts(style.Layout("AB", 4.0), style.Layout("A;B", 7.8))
+def _draw_why(axes: style.Mosaic, settled: xr.Dataset, farther: xr.Dataset) -> None:
     rows = np.arange(settled.sizes["start"])
     for task, color, shift in zip(settled.task.values, (style.BLUE, style.ORANGE), (-0.17, 0.17), strict=False):
         values = settled.start_nearest.sel(task=task).values
@@ -418,4 +419,3 @@ def _draw_why(settled: xr.Dataset, farther: xr.Dataset, narrow: bool) -> Figure:
     title, label = "B  Leg yaw needed, farther targets", "ε3 / legs always at 5° (%)"
     finish(axes["B"], ylim=(0.0, 135.0), xlabel="1/k₁ (deg/(N·mm))", ylabel=label, title=title)
     axes["B"].legend([f"R = {away:g} m" for away in farther.away.values], loc="upper center", ncols=2)
-    return figure

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chilopod.show import style
@@ -20,7 +19,6 @@ _LINES: dict[str, Any] = {
     "undecided": (0, (4, 2, 1, 2)),
     "out of range": (0, (1, 2)),
 }
-_LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
 
 
 def panel(data: xr.Dataset) -> Panel:
@@ -29,7 +27,7 @@ def panel(data: xr.Dataset) -> Panel:
     return Panel(
         name="branch",
         title=f"Curved walks over {shown}",
-        draw=lambda narrow: _draw(data, narrow),
+        draw=_draw(data),
         alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; the legend names lines "
         "of parts that are not stable.",
         text=(),
@@ -46,8 +44,8 @@ def table(data: xr.Dataset) -> xr.Dataset:
     return found
 
 
-def _draw(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_LAYOUTS, narrow)
+@style.in_layouts(style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
+def _draw(axes: style.Mosaic, data: xr.Dataset) -> None:
     x = data.parameter.values
     verdicts = _between(data)
     unit = data.parameter.attrs["units"].replace("*", "·")
@@ -79,7 +77,6 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         for verdict in sorted(shown):
             axes["B"].plot([], [], color=style.GREY, linestyle=_LINES[verdict], label=verdict)
     axes["B"].legend(loc="upper left")
-    return figure
 
 
 def _between(data: xr.Dataset) -> list[str]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullLocator
 
@@ -18,16 +17,13 @@ from chilopod.paper.robot.spread import VALLEYS, printed_number
 from chilopod.paper.robot.structures import TOLERANCE
 from chilopod.paper.robot.walks import SPRINGS
 from chilopod.paper.robot.why import ORDERS, SEARCHED, cause
-from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
+from chilopod.paper.shapes import DASHED, draw_bands, finish
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, spring, typeset
 from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
 from chilopod.tasks.identify.valley import LEAST
 
-_WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
-_SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
-_STRUCTURES = (style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
 _MET = 1.0  # misfit at which the base series is met
 _FARTHEST = 60.0  # per cent, where predictions are cut off
 _MOST = 100.0  # chi squared, where bars are cut off
@@ -49,7 +45,7 @@ def why(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-why",
         title=f"Why {printed.ONSET.value:g} and not {printed.CRITICAL_K1.value:g}: from the planar model to the robot",
-        draw=lambda narrow: _draw_why(data, narrow),
+        draw=_draw_why(data),
         alt="A: by how much each assumption of the planar model multiplies the spring at which the straight walk ends. "
         "B: that spring in the planar limit with one assumption less, and of the twin with one more.",
         text=(
@@ -74,8 +70,8 @@ def _times(value: float) -> str:
     return f"×{number(float(value), 3)}" if np.isfinite(value) else "?"
 
 
-def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_WHY, narrow)
+@style.in_layouts(style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
+def _draw_why(axes: style.Mosaic, data: xr.Dataset) -> None:
     rows = np.arange(data.sizes["factor"])
     span = np.abs(np.array([data.share_low, data.share_high]) - data.share.values)
     axes["A"].errorbar(data.share, rows, xerr=np.nan_to_num(span), fmt="o", color=style.BLUE, capsize=3.0)
@@ -87,14 +83,15 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
         label = f"{name}, {number(float(value), 2)}"
         axes["B"].axvline(value, color=color, lw=1.2, linestyle=DASHED, label=label)
     for letter in "AB":
-        axes[letter].set_yticks(rows, [str(name) for name in data.factor.values] if letter == "A" or narrow else [])
+        axes[letter].set_yticks(
+            rows, [str(name) for name in data.factor.values] if letter == "A" or axes.narrow else []
+        )
         axes[letter].invert_yaxis()
     finish(axes["B"], "x", xlim=(0.0, SEARCHED[1]), xlabel=f"end of the straight walk ({SPRING_UNIT})")
     handles, labels = axes["B"].get_legend_handles_labels()
     handles += [Patch(color=style.SKY), Patch(color=style.ORANGE)]
     labels += ["planar limit and this alone", "twin without this"]
-    figure.legend(handles, labels, loc="outside lower center", ncols=1 if narrow else 4)
-    return figure
+    axes.figure.legend(handles, labels, loc="outside lower center", ncols=1 if axes.narrow else 4)
 
 
 def _times_axis(axes: Axes, title: str) -> None:
@@ -119,7 +116,7 @@ def why_sets(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-why-sets",
         title="The reasons, by other constants that fit as well",
-        draw=lambda narrow: _draw_why_sets(data, narrow),
+        draw=_draw_why_sets(data),
         alt="By how much each assumption multiplies the spring at which the walk ends, for several sets of constants.",
         text=(
             f"The preset (filled), and {others.sizes['set']} sets drawn from the valley of constants that the data "
@@ -131,8 +128,8 @@ def why_sets(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_why_sets(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(style.Layout("A", 4.2), style.Layout("A", 4.6), narrow)
+@style.in_layouts(style.Layout("A", 4.2), style.Layout("A", 4.6))
+def _draw_why_sets(axes: style.Mosaic, data: xr.Dataset) -> None:
     count = data.sizes["set"]
     for index, parts in enumerate(data.share.values):
         rows = np.arange(parts.size) + 0.5 * (index / max(count - 1, 1) - 0.5)
@@ -142,8 +139,7 @@ def _draw_why_sets(data: xr.Dataset, narrow: bool) -> Figure:
     axes["A"].set_yticks(range(data.sizes["factor"]), [str(name) for name in data.factor.values])
     axes["A"].invert_yaxis()
     _times_axis(axes["A"], "Part of each")
-    figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return figure
+    axes.legend_below("A", 2, 2)
 
 
 def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], height: float) -> None:
@@ -184,7 +180,7 @@ def spread(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-spread",
         title="How far to trust the predictions: the valleys of constants that the data leave open",
-        draw=lambda narrow: _draw_spread(data, narrow),
+        draw=_draw_spread(data),
         alt="A: the constants of several sets, in parts of their ranges. B: what each predicts, beside the robot.",
         text=tuple(text),
         data=data,
@@ -243,8 +239,8 @@ def _refitted(found: xr.Dataset) -> str:
     )
 
 
-def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_SPREAD, narrow)
+@style.in_layouts(style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
+def _draw_spread(axes: style.Mosaic, data: xr.Dataset) -> None:
     paths = WITH_FRICTION.paths
     for index in data.set.values[::-1]:
         parts = WITH_FRICTION.parts_of(data.constants.values[index])
@@ -267,8 +263,7 @@ def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
             axes["B"].plot(value, place, "o", **_marked(data, index), label=label)
     axes["B"].set(xlim=(10.0, max(45.0, *SPRINGS[:-1])), xlabel=SPRING_UNIT, title="B  Predictions")
     # Inside it would hide points.
-    figure.legend(*axes["B"].get_legend_handles_labels(), loc="outside lower center", ncols=2 if narrow else 4)
-    return figure
+    axes.legend_below("B", 4, 2)
 
 
 def _marked(data: xr.Dataset, index: int) -> dict[str, Any]:
@@ -295,7 +290,7 @@ def structures(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-structures",
         title="What else the robot could be made of",
-        draw=lambda narrow: _draw_structures(data, narrow),
+        draw=_draw_structures(data),
         alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
         text=(
             f"Each of these structures was given to the preset, and its {len(FITTED.paths)} constants moved until it "
@@ -323,8 +318,8 @@ def _squares(value: float) -> str:
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
 
 
-def _draw_structures(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_STRUCTURES, narrow)
+@style.in_layouts(style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
+def _draw_structures(axes: style.Mosaic, data: xr.Dataset) -> None:
     rows = np.arange(data.sizes["structure"])
     met = data.misfit.sel(fit="fitted").values <= _MET
     names = [str(name) for name in data.structure.values]
@@ -340,10 +335,9 @@ def _draw_structures(data: xr.Dataset, narrow: bool) -> Figure:
         values = np.clip(off.values[:, column], -_FARTHEST, _FARTHEST)
         marker, color = _MARKERS[column % len(_MARKERS)], style.CURVES[column % len(style.CURVES)]
         axes["B"].plot(values, rows, marker, color=color, markersize=6, label=typeset(str(name)))
-    axes["B"].set_yticks(rows, names if narrow else [""] * len(names))
+    axes["B"].set_yticks(rows, names if axes.narrow else [""] * len(names))
     axes["B"].set(xlim=(-_FARTHEST - 3.0, _FARTHEST + 3.0), title="B  Predictions")
     for letter, label in (("A", "chi squared"), ("B", "onset relative to the paper's (%)")):
         axes[letter].invert_yaxis()
         finish(axes[letter], "x", xlabel=label)
-    legend_below(figure, axes["B"], 1 if narrow else 3)
-    return figure
+    axes.legend_below("B", 3)

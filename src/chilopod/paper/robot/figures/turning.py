@@ -6,14 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from chilopod.paper import printed
 from chilopod.paper.measures import spring_for
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.turning import INSTANTS, RobotTurning, verdict
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.shapes import DASHED, finish, legend_below
+from chilopod.paper.shapes import DASHED, finish
 from chilopod.paper.statements import listed
 from chilopod.paper.turning import figures as planar
 from chilopod.paper.turning.study import in_words, saturation
@@ -22,7 +21,6 @@ from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
 
-_STRATEGIES = (style.Layout("A", 3.6), style.Layout("A", 4.0))
 _TOP = (75, 41, 28, 21, 15, 10)
 _TOP_HOPF = (75, 41, 21, 15, 11, 8.7)
 
@@ -44,7 +42,7 @@ def turning(found: RobotTurning) -> Panel:
     return Panel(
         name="robot-turning",
         title="The robot in three dimensions: turning task A",
-        draw=lambda narrow: planar.draw_turning(found.robot, task, narrow),
+        draw=planar.draw_turning(found.robot, task),
         alt="The circle to the target; paths, distance and angle of the target over time with three springs.",
         text=(
             "The twin sees the target with its scanner, as the robot does, and yaws the legs of module 1 towards it; "
@@ -65,7 +63,7 @@ def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Pane
     return Panel(
         name=f"robot-criteria-{letter.lower()}",
         title=f"The robot in three dimensions: the three criteria, task {letter}",
-        draw=lambda narrow: planar.draw_criteria({planar.walks_of(task): task}, narrow, _TOP, k_hat=k_hat),
+        draw=planar.draw_criteria({planar.walks_of(task): task}, _TOP, k_hat=k_hat),
         alt=f"Distance, angle and leg yaw over 1/{k(1)}: {planar.places(task)}.",
         text=(
             f"Means and standard errors of {task.criteria.sizes['repeat']} walks at {number(task.time)}\u00a0s. "
@@ -103,7 +101,7 @@ def comparison(found: RobotTurning, hopf: TurningTask) -> Panel:
     return Panel(
         name="robot-hopf",
         title="The robot in three dimensions: pitchfork against Hopf",
-        draw=lambda narrow: planar.draw_comparison(task, hopf, narrow, _TOP_HOPF),
+        draw=planar.draw_comparison(task, hopf, _TOP_HOPF),
         alt="The three criteria over the spring for the two strategies.",
         text=(
             "Task A with all springs alike, the paper's five values, with the same disturbances. Criteria are taken at "
@@ -128,7 +126,7 @@ def strategies(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-strategies",
         title="The robot in three dimensions: pitchfork against Hopf, by how far legs yaw",
-        draw=lambda narrow: _draw_strategies(data, narrow),
+        draw=_draw_strategies(data),
         alt="Ratio of the smallest criteria of the two strategies, with intervals, for three limits of the leg yaw.",
         text=(
             f"Task A, {data.attrs['repeats']} walks with each spring. {verdict(data)}. Smallest ε1, ε2 and ε3 of the "
@@ -140,8 +138,8 @@ def strategies(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_strategies(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_STRATEGIES, narrow)
+@style.in_layouts(style.Layout("A", 3.6), style.Layout("A", 4.0))
+def _draw_strategies(axes: style.Mosaic, data: xr.Dataset) -> None:
     rows, at = np.arange(data.sizes["criterion"]), data.sel(instant=INSTANTS[0])
     for index, limit in enumerate(data.limit.values):
         one = at.sel(limit=limit)
@@ -152,5 +150,4 @@ def _draw_strategies(data: xr.Dataset, narrow: bool) -> Figure:
     axes["A"].set_yticks(rows, list(CRITERION_NAMES.values()))
     axes["A"].invert_yaxis()
     finish(axes["A"], "x", xlabel="pitchfork over Hopf")
-    legend_below(figure, axes["A"], 3)
-    return figure
+    axes.legend_below("A", 3, 3)
