@@ -103,14 +103,14 @@ def onset(study: CurvedStudy) -> Panel:
         name="curved-onset",
         title="How sure the square-root fit is",
         draw=_draw_onset(study),
-        alt=f"Critical spring by the fit over ranges of springs, from {number(float(near.critical_k1), 4)} to "
-        f"{number(float(wide.critical_k1), 4)}, beside the exact {number(exact, 4)}; and the power with which the bend "
+        alt=f"Critical spring by the fit over ranges of springs, from {number(near.critical_k1, 4)} to "
+        f"{number(wide.critical_k1, 4)}, beside the exact {number(exact, 4)}; and the power with which the bend "
         f"grows, {number(power, 1)} instead of one half.",
         text=(
             "A square root is what a supercritical pitchfork promises close by. How close? Fitted to all trials it "
-            f"gives {number(float(wide.critical_k1), 4)} ± {number(float(wide.trial_error), 1)} {SPRING_UNIT}, to "
-            f"those of the two stiffest curved springs {number(float(near.critical_k1), 4)} ± "
-            f"{number(float(near.trial_error), 1)}; the point itself is at {number(exact, 6)}. The error bars tell "
+            f"gives {number(wide.critical_k1, 4)} ± {number(wide.trial_error, 1)} {SPRING_UNIT}, to "
+            f"those of the two stiffest curved springs {number(near.critical_k1, 4)} ± "
+            f"{number(near.trial_error, 1)}; the point itself is at {number(exact, 6)}. The error bars tell "
             "how well another set of trials would repeat the fit, not how far the law is off: fitted to the exact "
             "walks of the same springs, without any noise, it is off as much (open dots). More trials do not help, "
             "only springs closer to the point do.",
@@ -130,14 +130,13 @@ def variants(study: CurvedStudy) -> Panel:
     each = [(name, data.isel(variant=row)) for row, name in enumerate(names)]
     changes = listing(f"{signed(100 * (float(at.equal_ratio) - 1), 1)}\u00a0% for {name}" for name, at in each[1:])
     fits = listing(
-        f"{number(float(at.fitted_k1), 4)} instead of {number(float(at.exact_k1), 4)} for {name} "
-        f"(robot {number(float(at.robot_k1), 2)})"
+        f"{number(at.fitted_k1, 4)} instead of {number(at.exact_k1, 4)} for {name} (robot {number(at.robot_k1, 2)})"
         for name, at in each
     )
     most = names[int(np.abs(data.equal_ratio.values - 1.0).argmax())]
     stiff = int((data.fitted_k1 > data.exact_k1).sum())
     folded = [
-        f"{name} (up to {spring(float(at.stiffest_k1), 4)})"
+        f"{name} (up to {spring(at.stiffest_k1, 4)})"
         for name, at in each
         if float(at.stiffest_k1) > float(at.exact_k1) * (1.0 + 1e-9)
     ]

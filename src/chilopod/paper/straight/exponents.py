@@ -42,7 +42,7 @@ def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
             + ("All others stay in the left half. " if (rest < 0.0).all() else "")
         ) + (
             "For stiff springs it is one of a complex pair, a bend that swings as it dies out; the two meet on the "
-            f"real axis between k₁ = {number(float(data.k1[born[0] - 1]))} and {number(float(data.k1[born[0]]))}, and "
+            f"real axis between k₁ = {number(data.k1[born[0] - 1])} and {number(data.k1[born[0]])}, and "
             "only one of them goes on to the right."
             if paired
             else ""

@@ -109,7 +109,7 @@ def modules(data: xr.Dataset) -> Panel:
         title="Critical k₁ over the number of modules",
         draw=_draw_modules(data),
         alt=f"Critical front spring for {counts[0]} to {counts[-1]} modules, between {number(np.nanmin(values))} and "
-        f"{spring(float(np.nanmax(values)), 3)}; open markers where the pitchfork is subcritical.",
+        f"{spring(np.nanmax(values), 3)}; open markers where the pitchfork is subcritical.",
         text=(
             f"The same critical spring for shorter and longer robots made of the same modules. {level}"
             + (f"For {spans(missing)} modules the straight walk is not lost through a pitchfork." if missing else ""),
@@ -136,7 +136,7 @@ def _draw_modules(axes_by: style.Mosaic, data: xr.Dataset) -> None:
     built = data.attrs["built"]
     for value in values[(counts == built) & ~np.isnan(values)]:
         line = {"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 6}
-        words, at = f"this robot: {number(float(value), 4)}", (built, float(value))
+        words, at = f"this robot: {number(value, 4)}", (built, float(value))
         style.note(axes, words, at, (0, -34), ha="center", va="top", arrowprops=line)
     missing = counts[np.isnan(values)]
     if missing.size:

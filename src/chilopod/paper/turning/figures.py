@@ -180,13 +180,13 @@ def criteria(found: Turning, letter: str) -> Panel:
         else f"Task {letter} ({psi:g}°, {away:g} m): the criteria again",
         draw=draw_criteria(shown, _TOP, k_hat=law),
         alt="Distance, angle and leg yaw over the compliance of the first spring, smallest at "
-        f"{listing(number(float(each), 2) for each in smallest)} {SPRING_UNIT}.",
+        f"{listing(number(each, 2) for each in smallest)} {SPRING_UNIT}.",
         text=(
             _said(found, letter),
             f"ε3 has no clear minimum within this task: from {flat.softest:g} to {flat.stiffest:g}\u00a0{SPRING_UNIT} "
             "no difference is told, because the legs stand at their limit of 5° until the target "
             "is passed, to whichever side. Integrated until each robot arrives, when its task is done, it is smallest "
-            f"at {spring(float(whole['at']), 2)}. A farther target shows a minimum (last figure)."
+            f"at {spring(whole['at'], 2)}. A farther target shows a minimum (last figure)."
             if first
             else "",
         ),
@@ -251,8 +251,7 @@ def places(task: TurningTask) -> str:
     """Springs at the minima of the criteria."""
     at = minima(task.criteria)["at"]
     return listing(
-        f"{title.partition(',')[0]} at {number(float(at.sel(criterion=name)), 3)}"
-        for name, title in CRITERION_NAMES.items()
+        f"{title.partition(',')[0]} at {number(at.sel(criterion=name), 3)}" for name, title in CRITERION_NAMES.items()
     )
 
 
@@ -328,7 +327,7 @@ def without(found: Turning) -> Panel:
         "leg yaw they turn to the target.",
         text=(
             f"Without the help of the legs the side is left to chance and the bend grows slowly: {listing(said)}; no "
-            f"heading has changed by more than {number(largest, 2)}° after {number(float(data.time[-1]), 2)}\u00a0s. "
+            f"heading has changed by more than {number(largest, 2)}° after {number(data.time[-1], 2)}\u00a0s. "
             "The paper found the same with its robot: many of nine walks failed, because the bend took long to come or "
             "went the wrong way, and all five with leg yaw arrived.",
             "With leg yaw "
@@ -366,8 +365,8 @@ def why(found: Turning) -> Panel:
     best = [float(farther.spring[int(row.argmin())]) for row in farther.effort.values]
     cm = 100.0 * settled.start_nearest
     apart = listing(
-        f"{number(float(cm.sel(task=task, start='bent')), 2)} and "
-        f"{number(float(cm.sel(task=task, start='bent, aimed')), 2)}\u00a0cm in task {task}"
+        f"{number(cm.sel(task=task, start='bent'), 2)} and "
+        f"{number(cm.sel(task=task, start='bent, aimed'), 2)}\u00a0cm in task {task}"
         for task in settled.task.values
     )
     return Panel(
@@ -380,7 +379,7 @@ def why(found: Turning) -> Panel:
             "The law is not wrong: it speaks of the settled curve. Undisturbed, without leg yaw and at the law's own "
             "spring, a robot that starts straight goes straight on. One that starts bent passes close by the target, "
             "and closer still once it is taken into account that on its curve module 1 does not move where it points, "
-            f"but {listing(f'{number(float(angle), 2)}°' for angle in abs(np.rad2deg(settled.slip)))} to the outside "
+            f"but {listing(f'{number(angle, 2)}°' for angle in abs(np.rad2deg(settled.slip)))} to the outside "
             f"in tasks {listing(str(task) for task in settled.task.values)}: {apart}. What the "
             "law leaves out is the time that the bend needs to grow, which next to the pitchfork is longer than the "
             "task. A softer spring bends faster and makes up for the delay.",

@@ -97,7 +97,7 @@ def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
 
     def span(name: str) -> str:
         values = data[name].values[inside & np.isfinite(data[name].values)]
-        return f"{number(float(values.min()))} to {number(float(values.max()))}" if values.size else "not found"
+        return f"{number(values.min())} to {number(values.max())}" if values.size else "not found"
 
     variants = listing(f"{span(name)} for {typeset(name)}" for name in _variants_of(data))
     others = f"Along the shaded valley the critical spring of variants, which were not fitted, is {variants}. "

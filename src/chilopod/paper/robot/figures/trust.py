@@ -53,7 +53,7 @@ def why(data: xr.Dataset) -> Panel:
             f"the planar model in another engine: its straight walk ends at {spring(data.attrs['vouched'])}, that "
             f"of the planar model at {spring(data.attrs['exact'])}.",
             f"{cause(data)}. Multipliers of bends of 1° tell where the straight walk ends, in the planar limit at "
-            f"{spring(float(data.end[0]), 3)}, in the twin at {spring(float(data.end[-1]), 3)}. "
+            f"{spring(data.end[0], 3)}, in the twin at {spring(data.end[-1], 3)}. "
             f"{data.sizes['subset']} subsets of {data.sizes['factor']} assumptions were removed; {inside} of them end "
             f"between {SEARCHED[0]:g} and {spring(SEARCHED[1], 3)}, the others count as the end that they are beyond. "
             f"A is the mean over all orders in which assumptions are removed, with what {100.0 * ORDERS:.0f} % of the "
@@ -67,7 +67,7 @@ def why(data: xr.Dataset) -> Panel:
 
 
 def _times(value: float) -> str:
-    return f"×{number(float(value), 3)}" if np.isfinite(value) else "?"
+    return f"×{number(value, 3)}" if np.isfinite(value) else "?"
 
 
 @style.in_layouts(style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
@@ -80,7 +80,7 @@ def _draw_why(axes: style.Mosaic, data: xr.Dataset) -> None:
     _bars(axes["B"], rows + 0.19, data.without.values, [style.ORANGE] * len(rows), 0.34)
     axes["B"].set_title("B  Each by itself")
     for value, color, name in ((data.end[0], style.GREY, "planar limit"), (data.end[-1], style.VERMILLION, "twin")):
-        label = f"{name}, {number(float(value), 2)}"
+        label = f"{name}, {number(value, 2)}"
         axes["B"].axvline(value, color=color, lw=1.2, linestyle=DASHED, label=label)
     for letter in "AB":
         axes[letter].set_yticks(
@@ -147,7 +147,7 @@ def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], h
         if np.isnan(value):
             continue
         axes.barh(row, value, height, color=color)
-        text = f"{value:g} or more" if value == SEARCHED[1] else number(float(value), 3)
+        text = f"{value:g} or more" if value == SEARCHED[1] else number(value, 3)
         away, side, ink = (-4, "right", "white") if value > 0.8 * SEARCHED[1] else (4, "left", style.BLACK)
         style.note(axes, text, (value, row), (away, 0), va="center", ha=side, color=ink)
 
@@ -203,7 +203,7 @@ def _predicted(found: xr.Dataset) -> str:
     said = []
     for name, values in _points(found).items():
         if count := int(np.isfinite(values).sum()):
-            mean, low, high = (number(float(each), 3) for each in (values.mean(), values.min(), values.max()))
+            mean, low, high = (number(each, 3) for each in (values.mean(), values.min(), values.max()))
             spread = f"{low} to {high}, " if count >= _FEWEST else ""
             said.append(f"{name} {mean} ({spread}{count} of {values.size} sets have one)")
     return listing(said) or "no point"
@@ -232,7 +232,7 @@ def _refitted(found: xr.Dataset) -> str:
     means = []
     for each, values in _points(found).items():
         known = np.isfinite(values.values)
-        means.append(f"{each} {number(float(np.average(values.values[known], weights=weights[known])), 3)}")
+        means.append(f"{each} {number(np.average(values.values[known], weights=weights[known]), 3)}")
     return (
         f"{said}, a fit and no prediction, {found.sizes['set']} sets count as {number(effective, 2)}: yaw friction "
         f"{number(1e3 * yaw, 2)}\u00a0mN·m, {listing(means)} on average."

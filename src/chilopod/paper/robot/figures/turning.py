@@ -120,7 +120,7 @@ def strategies(data: xr.Dataset) -> Panel:
     parts = []
     for limit in data.limit.values:
         at = data.sel(limit=limit, instant=INSTANTS[0])
-        numbers = [f"{number(float(one), 3)} ({number(float(low), 3)} to {number(float(high), 3)})"
+        numbers = [f"{number(one, 3)} ({number(low, 3)} to {number(high, 3)})"
                    for one, low, high in zip(at.ratio, at.low, at.high, strict=True)]  # fmt: skip
         parts.append(f"{limit:g}° {listing(numbers)}")
     return Panel(
