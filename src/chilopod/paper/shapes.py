@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 import xarray as xr
@@ -15,6 +15,7 @@ from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.printed import Band
 from chilopod.show import style
+from chilopod.show.style import finish as finish
 from chilopod.show.words import SPRING_UNIT, k, typeset
 from chilopod.statistics import means
 
@@ -27,14 +28,6 @@ WALKS: Final = (style.Layout("AB;CD", 7.4), style.Layout("A;B;C;D", 13.6))
 
 JOINTS: Final = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 """Layouts of the paper's Fig. "absolute"."""
-
-
-def finish(axes: Axes, grid: Literal["both", "x", "y"] = "both", legend: Any = None, **look: Any) -> None:
-    """Labels, title and limits of axes, lines to read values by, and a legend if a place for it is given."""
-    axes.set(**look)
-    axes.grid(True, axis=grid)
-    if legend:
-        axes.legend(loc=legend)
 
 
 def errorbars(

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, Concatenate, Final, ParamSpec
+from typing import Any, Concatenate, Final, Literal, ParamSpec
 
 import matplotlib as mpl
 import numpy as np
@@ -178,6 +178,14 @@ def bare(axes: Axes) -> None:
     """Turn axes into a drawing: equal scales, no frame, at the left of its space, below its title."""
     axes.set_aspect("equal", anchor="W")
     axes.axis("off")
+
+
+def finish(axes: Axes, grid: Literal["both", "x", "y"] = "both", legend: Any = None, **look: Any) -> None:
+    """Labels, title and limits of axes, lines to read values by, and a legend if a place for it is given."""
+    axes.set(**look)
+    axes.grid(True, axis=grid)
+    if legend:
+        axes.legend(loc=legend)
 
 
 def note(axes: Axes, text: str, at: tuple[float, float], away: tuple[float, float], **look: Any) -> None:

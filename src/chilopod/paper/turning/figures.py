@@ -16,16 +16,9 @@ from chilopod.paper import printed
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, over_compliance
 from chilopod.paper.statements import listed
+from chilopod.paper.turning import trials
 from chilopod.paper.turning.study import SCALES, Turning, all_lower, in_words, minima, saturation, softest_minima
-from chilopod.paper.turning.trials import (
-    LegYaw,
-    TurningTask,
-    arrivals,
-    by_leg_yaw,
-    outcome_words,
-    span,
-    springs_by_outcome,
-)
+from chilopod.paper.turning.trials import LegYaw, TurningTask, arrivals, by_leg_yaw, outcome_words, springs_by_outcome
 from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel
@@ -238,10 +231,10 @@ def _said(found: Turning, letter: str) -> str:
     return (
         f"Means and standard errors of {task.criteria.sizes['repeat']} walks, at {number(task.time)}\u00a0s. Robots "
         f"arrive with {min(arrived):g} to {max(arrived):g}\u00a0{SPRING_UNIT} (shaded); most have "
-        f"{outcome_words(task.criteria, span)}. The minima (parabola through the lowest mean and its neighbours): "
-        f"{places(task)}\u00a0{SPRING_UNIT}. The dashed line is the spring of the radius law, {spring(k_hat)}; "
-        f"for the robot the paper's is {printed.TASKS[letter].k_hat.value:g}, with all three minima around it. In the "
-        f"model they lie at {listing(number(part, 2) for part in parts)} of the law's spring."
+        f"{outcome_words(task.criteria, trials.span)}. The minima (parabola through the lowest mean and its "
+        f"neighbours): {places(task)}\u00a0{SPRING_UNIT}. The dashed line is the spring of the radius law, "
+        f"{spring(k_hat)}; for the robot the paper's is {printed.TASKS[letter].k_hat.value:g}, with all three minima "
+        f"around it. In the model they lie at {listing(number(part, 2) for part in parts)} of the law's spring."
         + (f" {_SLOW}" if min(parts) < 1.0 else "")
         + " The axis of ε3 does not start at zero."
     )
@@ -309,16 +302,9 @@ def draw_criteria(
 def without(found: Turning) -> Panel:
     """Fig. "without": trajectories with and without leg yaw."""
     data, cases = found.without, by_leg_yaw(found.without)
-    said = []
-    for case in cases:
-        arrived, trials = arrivals(case.alone)
-        said.append(f"with {spring(case.spring, 3)} {arrived} of {trials} arrive, {sides(case)}")
+    said = [f"with {spring(case.spring, 3)} {trials.counted(case.alone)} arrive, {sides(case)}" for case in cases]
+    helped = [f"{trials.counted(case.helped)} arrive with {spring(case.spring, 3)}" for case in cases]
     largest = float(np.rad2deg(max(np.abs(case.alone.turned).max() for case in cases)))
-    helped = [
-        f"{arrived} of {trials} arrive with {spring(case.spring, 3)}"
-        for case in cases
-        for arrived, trials in (arrivals(case.helped),)
-    ]
     return Panel(
         name="turning-without",
         title="With and without leg yaw",
@@ -330,10 +316,8 @@ def without(found: Turning) -> Panel:
             f"heading has changed by more than {number(largest, 2)}° after {number(data.time[-1], 2)}\u00a0s. "
             "The paper found the same with its robot: many of nine walks failed, because the bend took long to come or "
             "went the wrong way, and all five with leg yaw arrived.",
-            "With leg yaw "
-            + listing(helped)
-            + ". The first is the spring that comes nearest to the target, the second that of the radius law, so close "
-            "to the pitchfork that its bend hardly grows within the task.",
+            f"With leg yaw {listing(helped)}. The first is the spring that comes nearest to the target, the second "
+            "that of the radius law, so close to the pitchfork that its bend hardly grows within the task.",
         ),
         data=data,
     )

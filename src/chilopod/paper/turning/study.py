@@ -141,11 +141,7 @@ def _slip(record: xr.Dataset) -> float:
 
 
 def farther_targets(
-    robot: Robot,
-    laws: RadiusLaws,
-    bearing: float,
-    distances: Sequence[float],
-    folder: Folder,
+    robot: Robot, laws: RadiusLaws, bearing: float, distances: Sequence[float], folder: Folder
 ) -> xr.Dataset:
     """Results for targets in one direction at growing distances, with the effect of the time that a bend needs to grow.
 

@@ -158,19 +158,14 @@ def _best(criteria: xr.Dataset) -> float:
 def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequence[float], repeats: int) -> xr.Dataset:
     shape = (len(springs), repeats)
     found = [evaluate(record, time) for time in instants]
-    last, away = float(record.time[-1]), record.distance.transpose("robot", "time")
-    ends = np.where(np.isfinite(found[0].arrival), found[0].arrival, last).tolist()
+    arrival, away = found[0].arrival, record.distance.transpose("robot", "time")
     nearest = record.time.values[away.fillna(np.inf).argmin("time").values]
-    own = np.where(np.isfinite(found[0].arrival), found[0].arrival, nearest).tolist()
+    ends, own = (np.where(np.isfinite(arrival), arrival, each).tolist() for each in (float(record.time[-1]), nearest))
     alone = [evaluate(record.isel(robot=[index]), time) for index, time in enumerate(own)]
     until = np.array([efforts(record.isel(robot=[index]), end)[0] for index, end in enumerate(ends)])
     both = ("spring", "repeat")
-    names = {
-        "spring": over_springs(springs),
-        "instant": ["earliest arrival", "paper", "own"],
-        "repeat": np.arange(repeats),
-    }
-    data = xr.Dataset(coords=names)
+    instant = ["earliest arrival", "paper", "own"]
+    data = xr.Dataset(coords={"spring": over_springs(springs), "instant": instant, "repeat": np.arange(repeats)})
     data["seconds"] = ("instant", np.array([*instants, np.nan]), {"units": "s"})
     for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
         frozen = np.concatenate([getattr(each, name) for each in alone])
@@ -181,7 +176,7 @@ def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequen
         data[f"{name}_mean"] = data[name].mean("repeat", skipna=False, keep_attrs=True)
         error = data[name].std("repeat", ddof=1, skipna=False) / np.sqrt(repeats)
         data[f"{name}_error"] = error.assign_attrs(units=data[name].attrs["units"])
-    data["arrival"] = (both, found[0].arrival.reshape(shape), {"units": "s"})
+    data["arrival"] = (both, arrival.reshape(shape), {"units": "s"})
     data["nearest"] = (both, found[0].nearest.reshape(shape), {"units": "m"})
     labels = np.array([each.label for each in found[0].outcome], dtype=object)
     data["outcome"] = (both, labels.reshape(shape))
@@ -242,14 +237,18 @@ class LegYaw:
 
     def __str__(self) -> str:
         """Number of walks that arrive."""
-        (few, without), (many, with_) = (arrivals(each) for each in (self.alone, self.helped))
         left = int((self.alone.turned > 0.0).sum())
-        return f"{few} of {without} arrive ({left} turn left), with it {many} of {with_}"
+        return f"{counted(self.alone)} arrive ({left} turn left), with it {counted(self.helped)}"
 
 
 def arrivals(walks: xr.Dataset) -> tuple[int, int]:
     """Number of walks that arrive, and number of walks."""
     return int(np.nansum(walks.arrived)), int(np.isfinite(walks.arrived).sum())
+
+
+def counted(walks: xr.Dataset) -> str:
+    """Number of walks that arrive, of all, in words."""
+    return "{} of {}".format(*arrivals(walks))
 
 
 def by_leg_yaw(data: xr.Dataset) -> list[LegYaw]:

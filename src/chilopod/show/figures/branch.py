@@ -58,16 +58,14 @@ def _draw(axes: style.Mosaic, data: xr.Dataset) -> None:
 
     _curve(axes["B"], x, data.axis_radius.values, verdicts, style.BLUE, "body axis, (N−1) L / Σ|θ|")
     _curve(axes["B"], x, data.path_radius.values, verdicts, style.ORANGE, "path of module 1")
-    axes["B"].set(ylabel="radius (m)", title="Radius of the turn")
     # The radius grows without bound towards the pitchfork; what matters is what a robot can turn in.
-    axes["B"].set_ylim(0.0, 2.0)
+    axes["B"].set(ylim=(0.0, 2.0), ylabel="radius (m)", title="Radius of the turn")
 
     _curve(axes["C"], x, data.cost_of_transport.values, verdicts, style.GREEN, "")
     axes["C"].set(ylabel="cost of transport (1)", title="What it costs")
 
-    for axes_ in axes.values():
-        axes_.set_xlabel(label)
-        axes_.grid(True)
+    for each in axes.values():
+        style.finish(each, xlabel=label)
     _mark(axes["A"], data)
     bottom, top = axes["A"].get_ylim()
     axes["A"].set_ylim(top=top + 0.4 * (top - bottom))  # room for the legend

@@ -65,12 +65,10 @@ def _draw(axes: style.Mosaic, data: xr.Dataset) -> None:
     look: dict[str, Any] = {"color": style.VERMILLION, "label": "Neimark-Sacker", "zorder": 5, "clip_on": False}
     for letter, value in (("A", 0.0), ("B", first)):
         axes[letter].plot(data.attrs["value"], value, "D", **look)
+    places = {"A": "lower left", "B": "best", "C": "upper left"}
     for letter, each in axes.items():
-        each.set_xlabel("distance below the point (%)" if letter == "C" else label)
-        each.grid(True)
-    axes["A"].legend(loc="lower left")
-    axes["B"].legend(loc="best")
-    axes["C"].legend(loc="upper left")
+        below = "distance below the point (%)" if letter == "C" else label
+        style.finish(each, legend=places[letter], xlabel=below)
 
 
 def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, name: str) -> None:

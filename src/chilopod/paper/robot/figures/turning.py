@@ -16,7 +16,7 @@ from chilopod.paper.shapes import DASHED, finish
 from chilopod.paper.statements import listed
 from chilopod.paper.turning import figures as planar
 from chilopod.paper.turning.study import in_words, saturation
-from chilopod.paper.turning.trials import TurningTask, arrivals, by_leg_yaw, outcome_words
+from chilopod.paper.turning.trials import TurningTask, by_leg_yaw, counted, outcome_words
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
@@ -80,15 +80,14 @@ def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Pane
 def without(found: RobotTurning) -> Panel:
     """Fig. "without"."""
     data, (case,) = found.without, by_leg_yaw(found.without)
-    (few, walks), (many, with_) = arrivals(case.alone), arrivals(case.helped)
     return Panel(
         name="robot-without",
         title="The robot in three dimensions: with and without leg yaw",
         draw=lambda narrow: planar.draw_without(data, narrow),
         alt="Paths of module 1 with and without leg yaw.",
         text=(
-            f"Task A with {k(1)} = {case.spring:g}\u00a0{SPRING_UNIT}. Without leg yaw {few} of {walks} arrive, "
-            f"{planar.sides(case)}: the bend takes its time, and chance has the side. With it {many} of {with_} "
+            f"Task A with {k(1)} = {case.spring:g}\u00a0{SPRING_UNIT}. Without leg yaw {counted(case.alone)} arrive, "
+            f"{planar.sides(case)}: the bend takes its time, and chance has the side. With it {counted(case.helped)} "
             "arrive. The paper's robot: many of nine fail, all of five do not.",
         ),
         data=data,
