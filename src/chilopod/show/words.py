@@ -49,13 +49,11 @@ def k(joint: int) -> str:
 def typeset(text: str) -> str:
     """Text of the studies with proper signs for units, powers and springs, and no break between number and unit."""
     text = text.replace("*", "·").replace("k2-5", "k₂–k₅").replace(" deg", "°").replace("critical k1", "critical k₁")
-    text = re.sub(r"(\d)e([-+]?)0*(\d+)", lambda found: _power(found[1], found[2], found[3]), text)
+    text = re.sub(
+        r"(\d)e\+?(-?)0*(\d+)", lambda found: f"{found[1]}×10{(found[2] + found[3]).translate(_SUPERSCRIPTS)}", text
+    )
     text = re.sub(r"(?<![\w.])-(?=\d)", "−", text)
     return re.sub(r"([\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:N·|mm|cm|s\b|rad/s|%))", "\\1\u00a0", text)
-
-
-def _power(digit: str, sign: str, power: str) -> str:
-    return f"{digit}×10{(sign.strip('+') + power).translate(_SUPERSCRIPTS)}"
 
 
 def spans(counts: Sequence[int]) -> str:

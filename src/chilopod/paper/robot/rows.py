@@ -35,7 +35,7 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
         OfTwin(statements.STRAIGHT, Result(straight), within(most)),
         _curved(base),
         _spring(statements.ONSET, onset_point(base)),
-        *(_radius(base, spring, statement) for spring, statement in statements.RADII.items()),
+        *(estimated(said, radius_at(base, k), "m", none="no two trials curve") for k, said in statements.RADII.items()),
         estimated(statements.SPEED, mean(base.speed.sel(spring=PAPER_SPRING).values), "m/s", 4),
         compared(statements.RISING, Result(INCREASES[rising.answer]), rising),
         _fluctuation(base),
@@ -54,7 +54,7 @@ def _spring(statement: Statement[Band], twin: Estimate, reading: str = "") -> Of
     """Spring (N*mm/deg) beside the paper's; NaN if the trials determine no spring, or no error."""
     number = Result("", twin.value, twin.error, PAPER_UNIT, 1).words
     words = f"{number} ({100.0 * (twin.value / statement.said.middle - 1.0):+.0f} %)"
-    return estimated(statement, twin, PAPER_UNIT, 1, words if np.isfinite(twin.value) else "not determined", reading)
+    return estimated(statement, twin, PAPER_UNIT, 1, words, reading, "not determined")
 
 
 def _uniform(mode: xr.Dataset) -> OfTwin:
@@ -78,11 +78,6 @@ def _most(base: xr.Dataset, what: str, springs: tuple[float, ...]) -> tuple[str,
     pairs = zip(springs, repeats * share, strict=True)
     counts = ", ".join(f"{count:.0f} of {repeats} at {spring:g}" for spring, count in pairs)
     return f"{what}: {counts}", bool((share > 0.5).all())
-
-
-def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTwin:
-    found = radius_at(base, spring)
-    return estimated(statement, found, "m", words="no two trials curve" if np.isnan(found.value) else "")
 
 
 def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
@@ -171,8 +166,7 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
         said = statements.TASKS[letter]
         if walks is not None:
             spring = spring_for(walks.base, task.target.radius)
-            words = "" if np.isfinite(spring.value) else "none of the springs walked"
-            rows.append(estimated(said.k_hat, spring, PAPER_UNIT, 1, words))
+            rows.append(estimated(said.k_hat, spring, PAPER_UNIT, 1, none="none of the springs walked"))
         words = outcome_words(task.criteria, lambda springs: ", ".join(f"{k:g}" for k in springs))
         rows.append(OfTwin(said.outcomes, Result(words), within(_became(task.criteria, printed.TASKS[letter]))))
         low = minima(task.criteria)

@@ -15,8 +15,6 @@ from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, minus, number, spring
 
-_WIDE = style.Layout("AA;BC", 7.4, heights=(1.15, 1.0))
-_NARROW = style.Layout("A;B;C", 10.6)
 _MARKED = (75.0, 41.0, 28.0, 21.0, 15.0, 8.0, 4.0, 2.0)  # the paper's springs, and some below its crossing
 
 _STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "markeredgecolor": style.BLACK}
@@ -120,7 +118,7 @@ def _between(start: ComplexArray, end: ComplexArray) -> tuple[Array, ComplexArra
     return share, between
 
 
-@style.in_layouts(_WIDE, _NARROW)
+@style.in_layouts(style.Layout("AA;BC", 7.4, heights=(1.15, 1.0)), style.Layout("A;B;C", 10.6))
 def _draw(axes: style.Mosaic, data: xr.Dataset, crossing: float | None) -> None:
     critical = _critical(data)
     lead = critical if critical is not None else 0

@@ -17,10 +17,6 @@ from chilopod.show.panel import Panel
 from chilopod.show.scene.outline import chain, draw_heading, draw_joints, draw_modules, turned_about_tail
 from chilopod.show.words import SPRING_UNIT, k, listing, minus, number, signed, spans, spring, typeset
 
-_MODE = (
-    style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0)),
-    style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9)),
-)
 _ROUNDING = printed.MODE[0].tolerance
 _DRAWN_BEND = 75.0  # degrees from head to tail: the mode leaves the size free
 _SNAPSHOTS = 8
@@ -193,7 +189,10 @@ def mode(data: xr.Dataset) -> Panel:
     )
 
 
-@style.in_layouts(*_MODE)
+@style.in_layouts(
+    style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0)),
+    style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9)),
+)
 def _draw_mode(axes: style.Mosaic, data: xr.Dataset) -> None:
     computed, paper, joints = data.computed.values, data.printed.values, data.joint.values
     known = not np.isnan(paper).all()

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -73,25 +72,24 @@ class Turning:
 def turning(context: Context, progress: Progress = silent) -> Turning:
     """All turning studies of the robot of the planar model; if not full, fewer springs and fewer, nearer targets."""
     robot, folder, quick = context.robot, context.folder, context.size is not Size.FULL
-    springs = QUICK_SPRINGS if quick else SPRINGS
+    usual = SPRINGS, UNIFORM_SPRINGS, ROUGH_SPRINGS, FARTHER
+    springs, uniform, rougher, distances = (
+        (QUICK_SPRINGS, UNIFORM_SPRINGS[::3], QUICK_SPRINGS, FARTHER[:2]) if quick else usual
+    )
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}
     for index, (letter, said) in enumerate(printed.TASKS.items()):
         share = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
         tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=share)
     task = tasks["A"]
-    same: dict[str, Any] = {"folder": folder, "progress": part(progress, 0.5, 0.65, "uniform springs")}
-    uniform = UNIFORM_SPRINGS[::3] if quick else UNIFORM_SPRINGS
-    hopf = turning_task(robot, task.target, uniform, strategy="hopf", time=task.time, **same)
-    same["progress"] = part(progress, 0.65, 0.85, "larger disturbances")
-    rougher = Disturbance().scaled(ROUGH)
-    rough_springs = QUICK_SPRINGS if quick else ROUGH_SPRINGS
-    rough = turning_task(robot, task.target, rough_springs, disturbance=rougher, **same)
+    share = part(progress, 0.5, 0.65, "uniform springs")
+    hopf = turning_task(robot, task.target, uniform, strategy="hopf", time=task.time, folder=folder, progress=share)
+    share, disturbance = part(progress, 0.65, 0.85, "larger disturbances"), Disturbance().scaled(ROUGH)
+    rough = turning_task(robot, task.target, rougher, disturbance=disturbance, folder=folder, progress=share)
     springs_ = {"best spring": task.best, "spring of the law": laws.k_hat(task.target.radius)[0]}
     share = part(progress, 0.85, 0.9, "with and without leg yaw")
     without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=share)
     settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
-    distances = FARTHER[:2] if quick else FARTHER
     farther = farther_targets(robot, laws, task.target.bearing, distances, folder)
     progress(1.0, "turning tasks")
     point = first_loss(robot, ALL, None, Kind.NEIMARK_SACKER, normal_form=False)

@@ -16,8 +16,6 @@ from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
 from chilopod.tasks.identify import Identification, RecordedIdentification, TwinIdentification
 
-_WIDE = style.Layout("ABC;DEF", 6.2)
-_NARROW = style.Layout("A;B;C;D;E;F", 17.0)
 _COLUMNS = {
     *("friction", "half_width", "largest_residual", "critical_k1"),
     *("uniform", "coefficient", "verdict"),
@@ -129,7 +127,7 @@ def _changes(data: xr.Dataset) -> Array:
     return np.asarray(x[at] - y[at] * (x[at + 1] - x[at]) / (y[at + 1] - y[at]))
 
 
-@style.in_layouts(_WIDE, _NARROW)
+@style.in_layouts(style.Layout("ABC;DEF", 6.2), style.Layout("A;B;C;D;E;F", 17.0))
 def _draw(axes: style.Mosaic, fit: Identification) -> None:
     data = fit.profile
     x = 1e3 * data.forward_offset.values
