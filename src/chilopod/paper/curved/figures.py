@@ -37,8 +37,7 @@ def walks(study: CurvedStudy) -> Panel:
     unsettled = int((~trials.settled).sum())
     straight, curved = (float(value) for value in study.examples.spring.values)
     stiff = trials.spring.values > exact
-    if here.any():
-        wider, softest, stiffest = fluctuation(trials)
+    wider, softest, stiffest = fluctuation(trials)
     tighter = [
         number(radius.value / float(axis_radius(study.branch, exact * at / printed.ONSET.value)), 2)
         for at, radius in printed.RADII.items()
@@ -69,9 +68,7 @@ def walks(study: CurvedStudy) -> Panel:
             f"{number(softest, 2)}, beside that at {spring(stiffest)}, is {wider}: uneven feet leave a straight walk "
             "straight and only move the critical spring of a trial a little, and the bend depends on that most where "
             "it rises steeply, beside the critical spring.",
-        )
-        if here.any()
-        else ("No trial ended in a curve.",),
+        ),
         data=trials.drop_vars("end_state"),
     )
 
