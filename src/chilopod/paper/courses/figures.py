@@ -135,7 +135,8 @@ def where(data: xr.Dataset) -> Panel:
     shown = (VARIABLE.name, STRATEGIES["pitchfork"].name)
     maps = {name: share_map(data.sel(case=name)) for name in shown}
     ours, fixed = (maps[name] for name in shown)
-    missed = _missed(ours)
+    missed, few = _missed(ours), _percent(_FEWEST)
+    said = f"more than {few} are missed {missed}." if missed else f"none misses more than {few}."
     return Panel(
         name="courses-where",
         title="Where targets are missed",
@@ -145,12 +146,7 @@ def where(data: xr.Dataset) -> Panel:
         text=(
             "Targets by the angle and distance at which they are put up. One spring for all of a course is that of one "
             f"circle: fields of its map range from {_percent(np.nanmin(fixed))} to {_percent(np.nanmax(fixed))}. With "
-            f"the spring that is set on the way the lowest has {_percent(np.nanmin(ours))}; "
-            + (
-                f"more than {_percent(_FEWEST)} are missed {missed}."
-                if missed
-                else f"none misses more than {_percent(_FEWEST)}."
-            ),
+            f"the spring that is set on the way the lowest has {_percent(np.nanmin(ours))}; {said}",
         ),
         data=xr.Dataset(
             {"reached": (("strategy", "away", "bearing"), np.stack(list(maps.values())), {"units": "1"})},
@@ -242,18 +238,13 @@ def _decided(data: xr.Dataset) -> str:
         (other,) = (each for each in data.strategy.values if each != VARIABLE.name)
         if share.above(share_of_targets(data.sel(condition=name, strategy=other).arrived)) is True:
             better.append(str(name))
-    fixed = spring(data.attrs["spring"], 2)
+    fewer = f"with {listing(worse)}" if worse else "under none of these conditions"
+    more = f"beyond doubt under {f'these: {listing(better)}' if better else 'none'}"
+    if len(better) == data.sizes["condition"]:
+        more = "under every one of them"
     return (
-        f"As usual it reaches {percent(usual)} of targets; "
-        + (f"clearly fewer with {listing(worse)}" if worse else "clearly fewer under none of these conditions")
-        + f". It reaches more than {fixed} all along "
-        + (
-            "under every one of them."
-            if len(better) == data.sizes["condition"]
-            else f"beyond doubt under these: {listing(better)}."
-            if better
-            else "beyond doubt under none."
-        )
+        f"As usual it reaches {percent(usual)} of targets; clearly fewer {fewer}. It reaches more than "
+        f"{spring(data.attrs['spring'], 2)} all along {more}."
     )
 
 

@@ -166,11 +166,10 @@ def criteria(found: Turning, letter: str) -> Panel:
     smallest = minima(task.criteria)["at"].sel(criterion=list(CRITERION_NAMES)).values
     psi, away, law = np.rad2deg(task.target.bearing), task.target.distance, found.laws.k_hat(task.target.radius)[0]
     shown = {walks_of(task): task}
+    other = f"Task {letter} ({psi:g}°, {away:g} m): the criteria again"
     return Panel(
         name="turning-criteria" if first else "turning-another",
-        title="Task A: the paper's three criteria over the spring"
-        if first
-        else f"Task {letter} ({psi:g}°, {away:g} m): the criteria again",
+        title="Task A: the paper's three criteria over the spring" if first else other,
         draw=draw_criteria(shown, _TOP, k_hat=law),
         alt="Distance, angle and leg yaw over the compliance of the first spring, smallest at "
         f"{listing(number(each, 2) for each in smallest)} {SPRING_UNIT}.",

@@ -287,6 +287,7 @@ def structures(data: xr.Dataset) -> Panel:
     ratio = data.criteria.sel(strategy="pitchfork") / data.criteria.sel(strategy="hopf")
     below = (ratio < 1.0).all("criterion").values
     lower = [str(name) for name, yes in zip(data.structure.values, below & met, strict=True) if yes]
+    tried = [f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)]
     return Panel(
         name="robot-structures",
         title="What else the robot could be made of",
@@ -294,19 +295,13 @@ def structures(data: xr.Dataset) -> Panel:
         alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
         text=(
             f"Each of these structures was given to the preset, and its {len(FITTED.paths)} constants moved until it "
-            "meets the base series again, from few and undisturbed walks: "
-            + "; ".join(
-                f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)
-            )
-            + ".",
+            f"meets the base series again, from few and undisturbed walks: {'; '.join(tried)}.",
             f"A adds up the squares of how far its predictions are from the paper's, over {100.0 * TOLERANCE:g} %: the "
-            f"preset has {_squares(squared[0])}, "
-            + (f"less have {listing(better)}." if better else "none has less.")
+            f"preset has {_squares(squared[0])}, {f'less have {listing(better)}' if better else 'none has less'}."
             + (f" Pale: {listing(missed)}, which did not meet the base series within its tolerance." if missed else "")
             + " For the shorter stride the nearer of its two readings counts.",
             "In task A the smallest criteria of one soft spring are all three below those of springs all alike with "
-            + (listing(lower) if lower else "none of those that meet it")
-            + ".",
+            f"{listing(lower) or 'none of those that meet it'}.",
         ),
         data=data,
     )
