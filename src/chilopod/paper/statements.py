@@ -117,9 +117,7 @@ WITHOUT = _said(
     f"at most {printed.WITHOUT_LEG_YAW // 2} arrive without, all with",
 )
 HOPF = _said(
-    "task A, pitchfork against Hopf: smallest criteria",
-    "lower for the pitchfork, all three",
-    "all three lower",
+    "task A, pitchfork against Hopf: smallest criteria", "lower for the pitchfork, all three", "all three lower"
 )
 HOPF_SPRINGS = _said(
     "task A, Hopf: springs of the smallest criteria",

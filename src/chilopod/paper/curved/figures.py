@@ -251,17 +251,9 @@ def _draw_variants(axes: style.Mosaic, study: CurvedStudy) -> None:
 
 def _draw_onsets(axes: Axes, data: xr.Dataset, narrow: bool) -> None:
     rows = np.arange(data.sizes["variant"])
-    axes.errorbar(
-        data.fitted_k1,
-        rows - 0.12,
-        xerr=data.error,
-        fmt="o",
-        color=style.ORANGE,
-        markerfacecolor="white",
-        markeredgewidth=1.6,
-        capsize=2.5,
-        label="square-root fit to trials",
-    )
+    open_: dict[str, Any] = {"color": style.ORANGE, "markerfacecolor": "white", "markeredgewidth": 1.6, "capsize": 2.5}
+    label = "square-root fit to trials"
+    axes.errorbar(data.fitted_k1, rows - 0.12, xerr=data.error, fmt="o", label=label, **open_)
     axes.plot(data.exact_k1, rows + 0.12, "D", color=style.VERMILLION, label="pitchfork")
     look: dict[str, Any] = {"color": style.BLUE, "lw": 3.0, "zorder": 1, "label": "curved walks last up to here"}
     axes.hlines(rows + 0.12, data.exact_k1, data.stiffest_k1, **look)

@@ -95,13 +95,8 @@ def curved_trials(
     records = spring_walks(robot, springs, durations, repeats=repeats, **walk)
     data = by_spring([_outcome(record, robot) for record in records], springs)
     data["duration"] = ("spring", np.array(durations), {"units": "s"})
-    data.attrs = {
-        "robot": robot.name,
-        "varied": K1,
-        "critical_k1": pitchfork(robot, normal_form=False).value,
-        "averaged_s": AVERAGED,
-        "about": "walks from straight on, averaged at their end",
-    }
+    exact, about = pitchfork(robot, normal_form=False).value, "walks from straight on, averaged at their end"
+    data.attrs = {"robot": robot.name, "varied": K1, "critical_k1": exact, "averaged_s": AVERAGED, "about": about}
     return data
 
 
@@ -301,11 +296,9 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     *springs_, counts = np.array(rows, dtype=np.float64).T
     names = ("critical_k1", "error", "trial_error", "exact_walks")
     columns = {name: ("softest", each, {"units": PAPER_UNIT}) for name, each in zip(names, springs_, strict=True)}
-    return xr.Dataset(
-        {**columns, "trials": ("softest", counts.astype(int))},
-        coords={"softest": ("softest", softest, {"units": PAPER_UNIT})},
-        attrs={"robot": trials.attrs["robot"], "exact_k1": trials.attrs["critical_k1"]},
-    )
+    columns["trials"] = ("softest", counts.astype(int), {})
+    attrs = {"robot": trials.attrs["robot"], "exact_k1": trials.attrs["critical_k1"]}
+    return xr.Dataset(columns, {"softest": ("softest", softest, {"units": PAPER_UNIT})}, attrs)
 
 
 def law_along_branch(branch: xr.Dataset) -> xr.Dataset:
@@ -325,15 +318,13 @@ def law_along_branch(branch: xr.Dataset) -> xr.Dataset:
         angles = on_branch(branch, "mean_angle", 1.0 / inverse)[:, 0]
         found.append((square_root_fit(inverse, angles).critical, angles[-1]))
     critical, angle = np.array(found).T
-    return xr.Dataset(
-        {
-            "critical_k1": ("softest", critical, {"units": PAPER_UNIT}),
-            "angle": ("softest", angle, {"units": "rad"}),
-            "power": ("softest", np.gradient(np.log(angle), np.log(1.0 / softest - 1.0 / exact)), {"units": "1"}),
-        },
-        coords={"softest": ("softest", softest, {"units": PAPER_UNIT})},
-        attrs={"robot": branch.attrs["robot"], "exact_k1": exact},
-    )
+    columns = {
+        "critical_k1": ("softest", critical, {"units": PAPER_UNIT}),
+        "angle": ("softest", angle, {"units": "rad"}),
+        "power": ("softest", np.gradient(np.log(angle), np.log(1.0 / softest - 1.0 / exact)), {"units": "1"}),
+    }
+    attrs = {"robot": branch.attrs["robot"], "exact_k1": exact}
+    return xr.Dataset(columns, {"softest": ("softest", softest, {"units": PAPER_UNIT})}, attrs)
 
 
 def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Dataset]) -> xr.Dataset:

@@ -23,16 +23,11 @@ def mode_rows(data: xr.Dataset) -> list[Row]:
     """The pitchfork and its mode."""
     found, said = data.attrs, printed.CRITICAL_K1
     kind = f"{found['kind']}, {found['criticality']} (coefficient {found['coefficient']:.4g} /rad² per cycle)"
+    crossing, same = f"{printed.KIND} (from the exponent crossing on the real axis)", found["kind"] == printed.KIND
+    remark = "the paper's linear analysis does not give a direction"
     rows = [
         Row("critical k1", str(said), _located(data), ANALYSIS, agreement(said.band.holds(found["value"]))),
-        Row(
-            "kind and direction",
-            f"{printed.KIND} (from the exponent crossing on the real axis)",
-            Result(kind),
-            ANALYSIS,
-            agreement(found["kind"] == printed.KIND),
-            "the paper's linear analysis does not give a direction",
-        ),
+        Row("kind and direction", crossing, Result(kind), ANALYSIS, agreement(same), remark),
     ]
     for joint, (computed, paper) in enumerate(zip(data.computed.values, printed.MODE, strict=True), 1):
         beyond = abs(computed - paper.value) - paper.tolerance
@@ -58,30 +53,21 @@ def module_rows(data: xr.Dataset) -> list[Row]:
     """Longer robots."""
     longer = data.sel(modules=data.modules > 6).critical_k1
     base, said = float(data.sel(modules=6).critical_k1), printed.LITTLE_CHANGE
-    return [
-        Row(
-            f"critical k1 for 7 to {int(data.modules[-1])} modules of the same size",
-            said.words,
-            Result(f"{float(longer.min()):.2f} to {float(longer.max()):.2f} {PAPER_UNIT}"),
-            f"{ANALYSIS}, figure D",
-            agreement(all(said.holds(float(value) / base) for value in longer)),
-        )
-    ]
+    quantity = f"critical k1 for 7 to {int(data.modules[-1])} modules of the same size"
+    result = Result(f"{float(longer.min()):.2f} to {float(longer.max()):.2f} {PAPER_UNIT}")
+    verdict = agreement(all(said.holds(float(value) / base) for value in longer))
+    return [Row(quantity, said.words, result, f"{ANALYSIS}, figure D", verdict)]
 
 
 def uniform_rows(data: xr.Dataset) -> list[Row | OfPlanar]:
     """All springs alike."""
     found = data.attrs
     cycle = f"{found['frequency_rad_s']:.4f} rad/s: a cycle of {found['oscillation_period_s']:.1f} s"
+    kind = Result(f"{found['kind']}, {found['criticality']}, {cycle}")
+    said, verdict = f'{printed.UNIFORM_KIND} ("Hopf")', agreement(found["kind"] == printed.UNIFORM_KIND)
     return [
         unprinted("uniform springs: critical k", _located(data), printed.COMPARISON),
-        Row(
-            "uniform springs: kind",
-            f'{printed.UNIFORM_KIND} ("Hopf")',
-            Result(f"{found['kind']}, {found['criticality']}, {cycle}"),
-            ANALYSIS,
-            agreement(found["kind"] == printed.UNIFORM_KIND),
-        ),
+        Row("uniform springs: kind", said, kind, ANALYSIS, verdict),
         OfPlanar(statements.UNIFORM, Result(value=found["value"], unit=PAPER_UNIT)),
     ]
 

@@ -186,12 +186,9 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
     95 % of cases, as the tests share their level (Bonferroni); ``mean`` and ``error`` of the smallest.
     """
     at_instant = criteria.isel(instant=instant)
-    rows = np.array([_minimum(at_instant, name) for name in CRITERIA])
-    return xr.Dataset(
-        {name: ("criterion", column) for name, column in zip(_COLUMNS, rows.T, strict=True)},
-        coords={"criterion": list(CRITERIA)},
-        attrs={"seconds": float(at_instant.seconds)},
-    )
+    columns = zip(_COLUMNS, np.array([_minimum(at_instant, name) for name in CRITERIA]).T, strict=True)
+    data = {name: ("criterion", column) for name, column in columns}
+    return xr.Dataset(data, {"criterion": list(CRITERIA)}, {"seconds": float(at_instant.seconds)})
 
 
 def _minimum(criteria: xr.Dataset, name: str) -> tuple[float, ...]:

@@ -135,14 +135,8 @@ def strategy_tasks(
     for strategy, record in records.items():
         own = springs[strategy]
         criteria = _criteria(record, (when if np.isfinite(when) else duration, DURATION), own, repeats)
-        criteria.attrs = {
-            "robot": robot.name,
-            "target": str(target),
-            "strategy": strategy,
-            "duration_s": duration,
-            "earliest_arrival_s": earliest[strategy],
-            "radius_m": target.radius,
-        }
+        criteria.attrs = {"robot": robot.name, "target": str(target), "strategy": strategy, "duration_s": duration}
+        criteria.attrs |= {"earliest_arrival_s": earliest[strategy], "radius_m": target.radius}
         wanted = [ratio / 21.0 * _best(criteria) for ratio in (15.0, 21.0, 41.0)]
         nearest = [own[int(np.abs(np.log(np.asarray(own) / each)).argmin())] for each in wanted]
         paths = _paths(record, own, repeats, shown if shown and set(shown) <= set(own) else nearest)
