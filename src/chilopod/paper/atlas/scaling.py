@@ -114,15 +114,13 @@ def collapse(context: Context, progress: Progress = silent) -> xr.Dataset:
     curves = [[at(float(each), **factors) for each in rest] for factors in ROBOTS.values()]
     law = [[at(built, mass=float(mass), stride=stride) for mass in masses] for stride in strides]
     scales = [spring_scale(scaled(robot, **factors)) / stiffness(1.0) for factors in ROBOTS.values()]
-    return xr.Dataset(
-        {
-            "curve": (("robot", "rest"), np.array(curves)),
-            "scale": ("robot", np.array(scales), {"units": PAPER_UNIT}),
-            "law": (("stride", "mass"), np.array(law)),
-            "inertia": ("mass", [inertia(scaled(robot, mass=float(mass))) for mass in masses]),
-        },
-        coords={"robot": list(ROBOTS), "rest": rest, "mass": masses, "stride": list(strides)},
-    )
+    columns = {
+        "curve": (("robot", "rest"), np.array(curves)),
+        "scale": ("robot", np.array(scales), {"units": PAPER_UNIT}),
+        "law": (("stride", "mass"), np.array(law)),
+        "inertia": ("mass", [inertia(scaled(robot, mass=float(mass))) for mass in masses]),
+    }
+    return xr.Dataset(columns, {"robot": list(ROBOTS), "rest": rest, "mass": masses, "stride": list(strides)})
 
 
 def panel(data: xr.Dataset) -> Panel:

@@ -358,21 +358,17 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
         "stiffest_k1": [float(branch.parameter.max()) for branch in all_branches],
     }
     kinds = np.array([branch.attrs["criticality"] for branch in all_branches], dtype=object)
-    return xr.Dataset(
-        {
-            **{name: ("variant", np.array(values), {"units": PAPER_UNIT}) for name, values in springs.items()},
-            "criticality": ("variant", kinds),
-            "radius": (("variant", "ratio"), radius, {"units": "m"}),
-            "radius_error": (("variant", "ratio"), error, {"units": "m"}),
-            "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
-            "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
-        },
-        coords={
-            "variant": np.array(list(variants), dtype=object),
-            "ratio": variants[printed.AS_BUILT].spring.values / exact[0],
-        },
-        attrs={"robot": base.attrs["robot"], "spring": spring},
-    )
+    columns = {
+        **{name: ("variant", np.array(values), {"units": PAPER_UNIT}) for name, values in springs.items()},
+        "criticality": ("variant", kinds),
+        "radius": (("variant", "ratio"), radius, {"units": "m"}),
+        "radius_error": (("variant", "ratio"), error, {"units": "m"}),
+        "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
+        "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
+    }
+    ratios = variants[printed.AS_BUILT].spring.values / exact[0]
+    coords = {"variant": np.array(list(variants), dtype=object), "ratio": ratios}
+    return xr.Dataset(columns, coords, {"robot": base.attrs["robot"], "spring": spring})
 
 
 def axis_radius(branch: xr.Dataset, spring: float | Array) -> Array:

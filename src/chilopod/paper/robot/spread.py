@@ -80,6 +80,7 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
         progress(index / len(sets), f"set {index + 1} of {len(sets)}")
         rows.append({**predictions(other, folder, size=size), **nearest_springs(other, folder, size)})
     series = base_series_data()
+    numbers = len(series.radii) + len(series.speeds) + 1
     names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), WITH_FRICTION.paths
 
     def table(name: str, over: str, keys: list[str]) -> tuple[tuple[str, str], np.ndarray]:
@@ -99,11 +100,7 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
             "effective": ("from", [each.effective for each in samples.values()]),
         },
         coords={"set": np.arange(len(sets)), "constant": paths, "variant": names, "task": tasks, "from": list(samples)},
-        attrs={
-            "robot": robot.name,
-            "numbers": len(series.radii) + len(series.speeds) + 1,
-            "answers": len(series.curved) + len(series.straight),
-        },
+        attrs={"robot": robot.name, "numbers": numbers, "answers": len(series.curved) + len(series.straight)},
     )
 
 
@@ -181,15 +178,12 @@ def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
         speeds.append(found.speeds)
         radii.append(robot.axis_radius(found.bends))
         onsets.append(point_of(fitted(1.0 / np.array(springs), np.abs(found.bends[:, 0]))).value)
-    return xr.Dataset(
-        {
-            "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
-            "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
-            "onset": ("case", np.array(onsets), {"units": PAPER_UNIT}),
-        },
-        coords={"case": list(cases), "spring": over_springs(springs)},
-        attrs={"robot": robot.name},
-    )
+    columns = {
+        "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
+        "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
+        "onset": ("case", np.array(onsets), {"units": PAPER_UNIT}),
+    }
+    return xr.Dataset(columns, {"case": list(cases), "spring": over_springs(springs)}, {"robot": robot.name})
 
 
 def numeric_rows(data: xr.Dataset) -> list[OfTwin]:

@@ -212,17 +212,15 @@ def uniform_modes(
     ends = np.array([_passes_one(springs, *each) for each in zip(modulus, error, strict=True)]).T
     with np.errstate(divide="ignore"):
         period = 2.0 * np.pi * robot.gait.period / turn
-    return xr.Dataset(
-        {
-            "modulus": (("mode", "spring"), modulus),
-            "modulus_error": (("mode", "spring"), error),
-            "period": (("mode", "spring"), period, {"units": "s"}),
-            "end": ("mode", ends[0], {"units": PAPER_UNIT}),
-            "end_error": ("mode", ends[1], {"units": PAPER_UNIT}),
-        },
-        coords={"mode": [UNDULATION, BEND], "spring": measures.over_springs(springs)},
-        attrs={"robot": robot.name, "amplitude": AMPLITUDE},
-    )
+    columns = {
+        "modulus": (("mode", "spring"), modulus),
+        "modulus_error": (("mode", "spring"), error),
+        "period": (("mode", "spring"), period, {"units": "s"}),
+        "end": ("mode", ends[0], {"units": PAPER_UNIT}),
+        "end_error": ("mode", ends[1], {"units": PAPER_UNIT}),
+    }
+    coords = {"mode": [UNDULATION, BEND], "spring": measures.over_springs(springs)}
+    return xr.Dataset(columns, coords, {"robot": robot.name, "amplitude": AMPLITUDE})
 
 
 def _leading(mode: CycleMode | None) -> tuple[float, float, float]:

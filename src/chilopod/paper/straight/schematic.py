@@ -60,22 +60,16 @@ def legs(robot: Robot) -> xr.Dataset:
     stands = gait.stands(phase)
     centre = -robot.module_length * (np.arange(n) + 0.5)
     ahead = np.where(stands, gait.stroke(phase), np.nan)
-    both = ("module", "side")
-    return xr.Dataset(
-        {
-            "phase": (both, phase, {"units": "1", "about": "at t = 0, in cycles; 0 is touch-down"}),
-            "stands": (both, stands, {"about": "at t = 0"}),
-            "touch_down": (both, (-phase % 1.0) * gait.period, {"units": "s"}),
-            "foot_x": (
-                both,
-                centre[:, None] + robot.legs.forward_offset + ahead,
-                {"units": "m", "about": "at t = 0, from the front end, NaN in the air"},
-            ),
-            "centre_x": (("module",), centre, {"units": "m", "about": "from the front end"}),
-        },
-        coords={"module": np.arange(1, n + 1), "side": np.array(_SIDES, dtype=object)},
-        attrs={"robot": robot.name, "period_s": gait.period, "stance_s": gait.stance},
-    )
+    foot, both = centre[:, None] + robot.legs.forward_offset + ahead, ("module", "side")
+    columns = {
+        "phase": (both, phase, {"units": "1", "about": "at t = 0, in cycles; 0 is touch-down"}),
+        "stands": (both, stands, {"about": "at t = 0"}),
+        "touch_down": (both, (-phase % 1.0) * gait.period, {"units": "s"}),
+        "foot_x": (both, foot, {"units": "m", "about": "at t = 0, from the front end, NaN in the air"}),
+        "centre_x": (("module",), centre, {"units": "m", "about": "from the front end"}),
+    }
+    coords = {"module": np.arange(1, n + 1), "side": np.array(_SIDES, dtype=object)}
+    return xr.Dataset(columns, coords, {"robot": robot.name, "period_s": gait.period, "stance_s": gait.stance})
 
 
 @style.in_layouts(_WIDE, _NARROW)

@@ -76,16 +76,14 @@ def identification_rows(found: Identification) -> list[Row]:
     """The constants the paper does not print."""
     legs, allowed = found.best.legs, found.allowed("legs.forward_offset")
     span = "nowhere" if allowed is None else f"{1e3 * allowed[0]:.0f} to {1e3 * allowed[1]:.0f} mm"
-    return [
-        unprinted(
-            "foot friction, half-width, forward offset",
-            f"{found.best.ground.friction:.1f} N*s/m, {1e3 * legs.half_width:.1f} mm, "
-            f"{1e3 * legs.forward_offset:.1f} mm",
-            ANALYSIS,
-            f"best fit, largest residual {np.abs(found.residuals).max():.2f} of rounding "
-            f"(this robot: {np.abs(found.preset_residuals).max():.2f}); rounding allows forward offsets of {span}",
-        )
-    ]
+    friction, width, offset = found.best.ground.friction, 1e3 * legs.half_width, 1e3 * legs.forward_offset
+    largest, ours = (np.abs(each).max() for each in (found.residuals, found.preset_residuals))
+    remark = (
+        f"best fit, largest residual {largest:.2f} of rounding (this robot: {ours:.2f}); rounding allows forward "
+        f"offsets of {span}"
+    )
+    words = f"{friction:.1f} N*s/m, {width:.1f} mm, {offset:.1f} mm"
+    return [unprinted("foot friction, half-width, forward offset", words, ANALYSIS, remark)]
 
 
 def _located(data: xr.Dataset) -> Result:

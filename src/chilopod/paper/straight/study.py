@@ -47,15 +47,13 @@ def exponent_sweep(context: Context, progress: Progress = silent) -> xr.Dataset:
     # The curve that is in the left half-plane for stiff springs and in the right one for soft springs, on the real
     # axis.
     critical = (table.real[0] < 0.0) & (table.real[-1] > 0.0)
-    return xr.Dataset(
-        {
-            "real": (("k1", "exponent"), table.real, {"units": "1/s"}),
-            "imaginary": (("k1", "exponent"), table.imag, {"units": "1/s"}),
-            "follows_critical": (("exponent",), critical),
-        },
-        coords={"k1": ("k1", ks, {"units": PAPER_UNIT})},
-        attrs={"robot": robot.name, "about": "Floquet exponents of the straight walk, each followed as one curve"},
-    )
+    columns = {
+        "real": (("k1", "exponent"), table.real, {"units": "1/s"}),
+        "imaginary": (("k1", "exponent"), table.imag, {"units": "1/s"}),
+        "follows_critical": (("exponent",), critical),
+    }
+    attrs = {"robot": robot.name, "about": "Floquet exponents of the straight walk, each followed as one curve"}
+    return xr.Dataset(columns, {"k1": ("k1", ks, {"units": PAPER_UNIT})}, attrs)
 
 
 def _followed(
@@ -98,12 +96,9 @@ def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
         progress(index / len(robots), name)
         point = pitchfork(each)
         found.append((point.value, point.error_bound, printed.onset(name).value))
-    names, columns = ("critical_k1", "error_bound", "robot_printed"), np.array(found).T
-    return xr.Dataset(
-        {name: ("variant", each, {"units": PAPER_UNIT}) for name, each in zip(names, columns, strict=True)},
-        coords={"variant": np.array(list(robots), dtype=object)},
-        attrs={"robot": context.robot.name},
-    )
+    named = zip(("critical_k1", "error_bound", "robot_printed"), np.array(found).T, strict=True)
+    columns = {name: ("variant", each, {"units": PAPER_UNIT}) for name, each in named}
+    return xr.Dataset(columns, {"variant": np.array(list(robots), dtype=object)}, {"robot": context.robot.name})
 
 
 def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
@@ -125,15 +120,13 @@ def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
             found.append((np.nan, np.nan, error.problem))
         progress((index + 1) / len(counts), f"{count} modules")
     values, bounds, says = zip(*found, strict=True)
-    return xr.Dataset(
-        {
-            "critical_k1": ("modules", np.array(values), {"units": PAPER_UNIT}),
-            "error_bound": ("modules", np.array(bounds), {"units": PAPER_UNIT}),
-            "says": ("modules", np.array(says, dtype=object)),
-        },
-        coords={"modules": np.array(list(counts))},
-        attrs={"robot": context.robot.name, "built": context.robot.body.modules},
-    )
+    columns = {
+        "critical_k1": ("modules", np.array(values), {"units": PAPER_UNIT}),
+        "error_bound": ("modules", np.array(bounds), {"units": PAPER_UNIT}),
+        "says": ("modules", np.array(says, dtype=object)),
+    }
+    attrs = {"robot": context.robot.name, "built": context.robot.body.modules}
+    return xr.Dataset(columns, {"modules": np.array(list(counts))}, attrs)
 
 
 def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset:

@@ -119,16 +119,14 @@ def settled_start(robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target],
         aimed = Target(target.bearing + slip, target.distance)
         records += trials.run([replace(bent, target=aimed)], folder)
         found.append((*(float(record.distance.min()) for record in records), spring, slip))
-    columns = np.array(found)
-    return xr.Dataset(
-        {
-            "start_nearest": (("task", "start"), columns[:, :3], {"units": "m"}),
-            "law_spring": ("task", columns[:, 3], {"units": PAPER_UNIT}),
-            "slip": ("task", columns[:, 4], {"units": "rad"}),
-        },
-        coords={"task": list(targets), "start": ["straight", "bent", "bent, aimed"]},
-        attrs={"robot": robot.name},
-    )
+    *nearest, springs, slips = np.array(found).T
+    columns = {
+        "start_nearest": (("task", "start"), np.array(nearest).T, {"units": "m"}),
+        "law_spring": ("task", springs, {"units": PAPER_UNIT}),
+        "slip": ("task", slips, {"units": "rad"}),
+    }
+    coords = {"task": list(targets), "start": ["straight", "bent", "bent, aimed"]}
+    return xr.Dataset(columns, coords, {"robot": robot.name})
 
 
 def _slip(record: xr.Dataset) -> float:
@@ -158,19 +156,16 @@ def farther_targets(
         record = trials.together(trials.run(asked, folder))
         earliest = earliest_arrival(record)
         result = evaluate(record, earliest)
-        found.append(
-            xr.Dataset(
-                {
-                    "nearest": (both, result.nearest, {"units": "m"}),
-                    "effort": (both, result.effort, {"units": "rad^2*s"}),
-                    "effort_part": (both, result.effort / (2.0 * limit**2 * earliest), {"units": "1"}),
-                    "earliest": ((), earliest, {"units": "s"}),
-                    "k_hat": ((), laws.k_hat(target.radius)[0], {"units": PAPER_UNIT}),
-                },
-                coords={"away": ((), away, {"units": "m"}), "spring": over_springs(FARTHER_SPRINGS)},
-                attrs={"robot": robot.name, "bearing_deg": math.degrees(bearing)},
-            )
-        )
+        columns = {
+            "nearest": (both, result.nearest, {"units": "m"}),
+            "effort": (both, result.effort, {"units": "rad^2*s"}),
+            "effort_part": (both, result.effort / (2.0 * limit**2 * earliest), {"units": "1"}),
+            "earliest": ((), earliest, {"units": "s"}),
+            "k_hat": ((), laws.k_hat(target.radius)[0], {"units": PAPER_UNIT}),
+        }
+        coords = {"away": ((), away, {"units": "m"}), "spring": over_springs(FARTHER_SPRINGS)}
+        attrs = {"robot": robot.name, "bearing_deg": math.degrees(bearing)}
+        found.append(xr.Dataset(columns, coords, attrs))
     return xr.concat(found, "away")
 
 

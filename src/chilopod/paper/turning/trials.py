@@ -183,20 +183,15 @@ def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Se
     rows = [[springs.index(spring) * repeats + repeat for repeat in range(repeats)] for spring in shown]
     some = record.isel(robot=xr.DataArray(rows, dims=over[:2]), time=slice(None, None, _PATH_STEP))
     x, y = some.position.transpose("axis", *over).values
-    bearing = np.unwrap(some.bearing.transpose(*over).values, axis=2)
-    return xr.Dataset(
-        {
-            "x": (over, x, {"units": "m"}),
-            "y": (over, y, {"units": "m"}),
-            "distance": (over, some.distance.transpose(*over).values, {"units": "m"}),
-            "bearing": (over, bearing, {"units": "rad"}),
-        },
-        coords={
-            "shown": ("shown", np.asarray(shown, float), {"units": PAPER_UNIT}),
-            "repeat": np.arange(repeats),
-            "time": ("time", some.time.values, {"units": "s"}),
-        },
-    )
+    columns = {
+        "x": (over, x, {"units": "m"}),
+        "y": (over, y, {"units": "m"}),
+        "distance": (over, some.distance.transpose(*over).values, {"units": "m"}),
+        "bearing": (over, np.unwrap(some.bearing.transpose(*over).values, axis=2), {"units": "rad"}),
+    }
+    springs_ = ("shown", np.asarray(shown, float), {"units": PAPER_UNIT})
+    times = ("time", some.time.values, {"units": "s"})
+    return xr.Dataset(columns, {"shown": springs_, "repeat": np.arange(repeats), "time": times})
 
 
 def springs_by_outcome(criteria: xr.Dataset) -> dict[Outcome, list[float]]:
@@ -288,17 +283,15 @@ def without_leg_yaw(
         result = evaluate(record, duration)
         some = record.isel(time=slice(None, None, _PATH_STEP))
         place = some.position.transpose("axis", "robot", "time")
-        case = xr.Dataset(
-            {
-                "x": (("trial", "time"), place.sel(axis="x").values, {"units": "m"}),
-                "y": (("trial", "time"), place.sel(axis="y").values, {"units": "m"}),
-                "arrived": ("trial", np.isfinite(result.arrival).astype(float), {"units": "1"}),
-                "nearest": ("trial", result.nearest, {"units": "m"}),
-                "turned": ("trial", _last(record.heading), {"units": "rad"}),
-            },
-            coords={"time": ("time", some.time.values, {"units": "s"}), "trial": np.arange(len(asked))},
-        )
-        cases.append(case.reindex(trial=np.arange(most)))
+        columns = {
+            "x": (("trial", "time"), place.sel(axis="x").values, {"units": "m"}),
+            "y": (("trial", "time"), place.sel(axis="y").values, {"units": "m"}),
+            "arrived": ("trial", np.isfinite(result.arrival).astype(float), {"units": "1"}),
+            "nearest": ("trial", result.nearest, {"units": "m"}),
+            "turned": ("trial", _last(record.heading), {"units": "rad"}),
+        }
+        coords = {"time": ("time", some.time.values, {"units": "s"}), "trial": np.arange(len(asked))}
+        cases.append(xr.Dataset(columns, coords).reindex(trial=np.arange(most)))
         progress((index + 1) / (2 * len(springs)), f"{name}, leg yaw {'on' if leg_yaw else 'off'}")
     data = xr.concat(cases, dim="case")
     data["leg_yaw"] = ("case", np.tile([False, True], len(springs)))

@@ -94,6 +94,8 @@ def different(found: RobotWalks, uniform: xr.Dataset) -> Panel:
     for title, (name, data) in _variants(found).items():
         point, paper = onset_point(data).value, printed.onset(name).value
         said.append(f"{typeset(title)} {number(point, 3) if np.isfinite(point) else 'none'} (robot: {paper:g})")
+    each = [data.assign_coords(variant=name) for name, data in _all(found).items()]
+    data = xr.concat(each, "variant", join="outer", combine_attrs="drop_conflicts")
     return Panel(
         name="robot-different",
         title="The robot in three dimensions: other springs, strides and phases",
@@ -114,12 +116,7 @@ def different(found: RobotWalks, uniform: xr.Dataset) -> Panel:
                 else ""
             ),
         ),
-        data=xr.concat(
-            [each.assign_coords(variant=name) for name, each in _all(found).items()],
-            dim="variant",
-            join="outer",
-            combine_attrs="drop_conflicts",
-        ).drop_vars(("direction", "status")),
+        data=data.drop_vars(("direction", "status")),
     )
 
 
