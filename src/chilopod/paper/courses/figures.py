@@ -85,8 +85,9 @@ def _draw(axes: style.Mosaic, found: dict[str, Summary]) -> None:
     titles = [_TITLES[one.name] + ("" if np.isnan(one.spring) else f" = {one.spring:g}") for one in each]
     _reached(axes["A"], [one.targets for one in each], [one.courses for one in each], "A  Reached")
     axes["A"].legend(loc="best")
-    intervals(axes["B"], [one.seconds for one in each], rows - 0.12, style.BLUE, "o", "on it")
-    intervals(axes["B"], [one.spent for one in each], rows + 0.12, style.ORANGE, "s", "on it and those missed")
+    intervals(axes["B"], [one.seconds for one in each], rows - 0.12, "o", color=style.BLUE, label="on it")
+    spent, label = [one.spent for one in each], "on it and those missed"
+    intervals(axes["B"], spent, rows + 0.12, "s", color=style.ORANGE, label=label)
     finish(axes["B"], "x", "upper right", xlabel="time for a target reached (s)", title="B  Time")
     left = np.zeros(len(each))
     for name, color in (("spring", style.BLUE), ("drive", style.ORANGE)):
@@ -104,8 +105,8 @@ def _draw(axes: style.Mosaic, found: dict[str, Summary]) -> None:
 def _reached(axes: Axes, targets: Sequence[Interval], courses: Sequence[Interval], title: str) -> None:
     """Shares of targets and of whole courses, a row each."""
     rows = np.arange(len(targets), dtype=np.float64)
-    intervals(axes, targets, rows - 0.12, style.BLUE, "o", "targets", 100.0)
-    intervals(axes, courses, rows + 0.12, style.ORANGE, "s", "whole courses", 100.0)
+    intervals(axes, targets, rows - 0.12, "o", 100.0, color=style.BLUE, label="targets")
+    intervals(axes, courses, rows + 0.12, "s", 100.0, color=style.ORANGE, label="whole courses")
     _scaled(axes, len(rows), title)
 
 
@@ -113,21 +114,11 @@ def _scaled(axes: Axes, rows: int, title: str) -> None:
     finish(axes, "x", xlim=(-3.0, 103.0), ylim=(rows - 0.5, -0.5), xlabel="reached (%)", title=title)
 
 
-def intervals(
-    axes: Axes,
-    found: Sequence[Interval],
-    rows: Array,
-    color: str,
-    marker: str,
-    label: str = "",
-    scale: float = 1.0,
-    alpha: float = 1.0,
-) -> None:
+def intervals(axes: Axes, found: Sequence[Interval], rows: Array, marker: str, scale: float = 1.0, **look: Any) -> None:
     """Values with their intervals, a row each."""
     value, low, high = (scale * np.array([getattr(each, name) for each in found]) for name in ("value", "low", "high"))
     bars = np.maximum(0.0, np.array([value - low, high - value]))
-    look: dict[str, Any] = {"color": color, "markersize": 5, "elinewidth": 1.4, "capsize": 2.5, "alpha": alpha}
-    axes.errorbar(value, rows, xerr=bars, fmt=marker, label=label or None, **look)
+    axes.errorbar(value, rows, xerr=bars, fmt=marker, markersize=5, elinewidth=1.4, capsize=2.5, **look)
 
 
 def where(data: xr.Dataset) -> Panel:
@@ -273,7 +264,7 @@ def _conditions(axes: Axes, data: xr.Dataset, title: str) -> None:
             (share_of_targets, style.BLUE, "o", "targets"),
             (share_of_courses, style.ORANGE, "s", "courses"),
         ):
-            shares = [share(each) for each in arrived]
-            intervals(axes, shares, rows + shift, color, marker, f"{label}, {what}", 100.0, fill)
+            shares, look = [share(each) for each in arrived], {"label": f"{label}, {what}", "alpha": fill}
+            intervals(axes, shares, rows + shift, marker, 100.0, color=color, **look)
     axes.set_yticks(rows, [str(each) for each in data.condition.values])
     _scaled(axes, len(rows), title)

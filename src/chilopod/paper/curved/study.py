@@ -178,18 +178,16 @@ def _outcome(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     straight = bend < STRAIGHT and bend <= max(np.abs(before).max(), _ROUNDING)
     settled = walk.status.item() == Status.WALKED.label and (straight or change <= SETTLED * bend)
     side = "straight" if straight else "right" if last.sum() > 0.0 else "left"
-    return xr.Dataset(
-        {
-            "mean_angle": ("joint", last, {"units": "rad"}),
-            "change": ((), change, {"units": "rad"}),
-            "settled": ((), settled),
-            "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
-            "direction": ((), np.array(side if settled else "", dtype=object)),
-            "status": ((), np.array(walk.status.item(), dtype=object)),
-            "end_state": ("state", _reduced(walk.isel(time=-1))),
-        },
-        coords={"joint": walk.joint.values},
-    )
+    columns = {
+        "mean_angle": ("joint", last, {"units": "rad"}),
+        "change": ((), change, {"units": "rad"}),
+        "settled": ((), settled),
+        "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
+        "direction": ((), np.array(side if settled else "", dtype=object)),
+        "status": ((), np.array(walk.status.item(), dtype=object)),
+        "end_state": ("state", _reduced(walk.isel(time=-1))),
+    }
+    return xr.Dataset(columns, {"joint": walk.joint.values})
 
 
 def _reduced(moment: xr.Dataset) -> Array:

@@ -50,18 +50,18 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
     return rows + duration_rows(found.durations)
 
 
-def _spring(statement: Statement[Band], twin: Estimate, reading: str = "") -> OfTwin:
+def _spring(statement: Statement[Band], twin: Estimate) -> OfTwin:
     """Spring (N*mm/deg) beside the paper's; NaN if the trials determine no spring, or no error."""
     number = Result("", twin.value, twin.error, PAPER_UNIT, 1).words
     words = f"{number} ({100.0 * (twin.value / statement.said.middle - 1.0):+.0f} %)"
-    return estimated(statement, twin, PAPER_UNIT, 1, words, reading, "not determined")
+    return estimated(statement, twin, PAPER_UNIT, 1, words, "not determined")
 
 
 def _uniform(mode: xr.Dataset) -> OfTwin:
     """Spring at which the straight walk ends by a mode, with all springs alike. Its error is no scatter of trials."""
     point = Estimate(float(mode.end), float(mode.end_error), reciprocal=True)
     reading = f"by {mode.mode.item()}s of {np.rad2deg(mode.amplitude):.0f} deg"
-    return replace(_spring(statements.UNIFORM, point, reading), comparison=None)
+    return replace(_spring(statements.UNIFORM, point), reading=reading, comparison=None)
 
 
 def _curved(base: xr.Dataset) -> OfTwin:
@@ -114,10 +114,8 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
             f"{change(ratio.springs)} at equal springs, {listed(ratio.compared)}"
             + ("" if np.isnan(law) else f" (the robot's onsets alone would make it {change(Estimate(law))})")
         )
-    return [
-        _spring(said.onset, onset_point(data), reading),
-        estimated(said.radius, ratio.distance, "", words="; ".join(words), reading=reading),
-    ]
+    rows = [_spring(said.onset, onset_point(data)), estimated(said.radius, ratio.distance, "", words="; ".join(words))]
+    return [replace(row, reading=reading) for row in rows]
 
 
 def duration_rows(data: xr.Dataset) -> list[OfTwin]:

@@ -142,11 +142,9 @@ def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset
     components = point.joint_components
     phase = np.unwrap(np.angle(components))
     columns = {"amplitude": ("joint", np.abs(components)), "phase": ("joint", phase - phase[0], {"units": "rad"})}
-    return _over_joints(columns, robot, point).assign_attrs(
-        frequency_rad_s=point.point.frequency,
-        oscillation_period_s=2.0 * np.pi / point.point.frequency,
-        gait_period_s=robot.gait.period,
-    )
+    rate = point.point.frequency
+    times = {"oscillation_period_s": 2.0 * np.pi / rate, "gait_period_s": robot.gait.period}
+    return _over_joints(columns, robot, point).assign_attrs(frequency_rad_s=rate, **times)
 
 
 def identified(context: Context, progress: Progress = silent) -> Identification:
