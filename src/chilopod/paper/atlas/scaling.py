@@ -92,8 +92,6 @@ def predicted(robot: Robot, curves: xr.Dataset) -> float:
 def collapse(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Critical k1 over the other springs for :data:`ROBOTS`, and over inertia for three strides.
 
-    Returns
-    -------
     Dataset: ``curve`` over (robot, rest), and ``law`` over (stride, mass), in units of the scale; ``scale`` over robot;
     ``inertia`` over mass.
     """

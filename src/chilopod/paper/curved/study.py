@@ -81,8 +81,6 @@ def curved_trials(
     A trial walks for a number of e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
     at most. All have seeds of their own, and by default the disturbance of all studies.
 
-    Returns
-    -------
     Dataset over spring (N*mm/deg), repeat, joint and state: ``mean_angle`` over the last 5 s (rad; NaN where the walk
     ended before), ``change`` (rad; largest of any joint against the mean over the 30 s before), ``settled``,
     ``axis_radius`` (m, the paper's (N-1) L / sum |theta|), ``direction`` (left, right, straight; empty where it had not
@@ -107,8 +105,6 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     compared with the mirror image of the right one half a period later. The trials, from :func:`curved_trials`,
     have no spread of friction, as the branch has none.
 
-    Returns
-    -------
     Largest difference of any joint angle, rad, over (spring, repeat); NaN where the walk is straight or not settled.
     """
     joints = slice(3, robot.body.modules + 2)
@@ -276,8 +272,6 @@ def fitted(trials: xr.Dataset) -> SquareRootFit:
 def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     """The square-root fit over nested ranges of springs, from the pair nearest the point to all of them.
 
-    Returns
-    -------
     Dataset over softest (the softest spring fitted, N*mm/deg): ``critical_k1``, its ``error`` by the least squares and
     ``trial_error`` by the scatter of trials (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, the fit
     with every trial replaced by the exact walk of its spring (its error does not shrink with repeats), and ``trials``.
@@ -303,8 +297,6 @@ def law_along_branch(branch: xr.Dataset) -> xr.Dataset:
     """Error of the square-root law itself: fits to exact walks, evenly spread in 1/k, from the pitchfork to a softest
     spring.
 
-    Returns
-    -------
     Dataset over softest (N*mm/deg): ``critical_k1`` as fitted, ``angle`` of joint 1 there (rad), and ``power``, the
     slope of its logarithm over that of 1/k - 1/kc: one half where the law holds.
     """
@@ -328,8 +320,6 @@ def law_along_branch(branch: xr.Dataset) -> xr.Dataset:
 def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Changes by each of the paper's variants (Fig. "different").
 
-    Returns
-    -------
     Dataset over variant and ratio (of k1 to the variant's own critical one): ``fitted_k1`` with its ``error`` (by
     the scatter of trials), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1`` of the curved walks (above
     ``exact_k1`` where the branch folds back), all in N*mm/deg; ``criticality``; ``radius`` with ``radius_error``, mean

@@ -60,8 +60,6 @@ CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, 
 def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Predictions by the preset and by sets of constants drawn from both valleys; if not full, by one of each.
 
-    Returns
-    -------
     Dataset over set (0 the preset's), with the ``valley`` of each and by valley its number of ``effective`` samples:
     the constants (SI; ``unit`` is the unit of the robot file) by path over ``constant``, and predictions: over variant
     ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` as printed) and ``radius`` (over that as built, at an
@@ -160,8 +158,6 @@ def nearest_springs(robot: Robot, folder: Folder = None, size: Size = Size.FULL)
 def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Onset, radii and speeds with finer steps and a tighter solver; if not full, the first two cases only.
 
-    Returns
-    -------
     Dataset over case and spring: ``axis_radius`` (m) and ``speed`` of module 1 (m/s); over case: ``onset`` by the
     paper's method (N*mm/deg).
     """

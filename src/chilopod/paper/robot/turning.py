@@ -79,8 +79,6 @@ def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning
 def robot_strategies(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Task A with both strategies, for every limit of the legs' yaw; if not full, for the first one with fewer trials.
 
-    Returns
-    -------
     Dataset over limit (deg), instant and criterion: ``ratio``, ``low`` and ``high``, the results of
     :func:`chilopod.paper.turning.study.ratios`, and, over strategy too, ``smallest`` (m, rad, rad^2*s); over limit
     ``seconds``, the earliest arrival. Attribute: ``repeats``.

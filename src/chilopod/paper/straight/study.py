@@ -31,8 +31,6 @@ from chilopod.tasks.identify import Identification, identify_planar
 def exponent_sweep(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Floquet exponents as k1 falls (panel B), each followed through the sweep as one curve.
 
-    Returns
-    -------
     Dataset over (k1, exponent): ``real``, ``imaginary`` (1/s), and ``follows_critical``, True for the curve that
     crosses zero.
     """
@@ -74,8 +72,6 @@ def _followed(
 def critical_mode(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The pitchfork in k1 and its mode beside the paper's five numbers.
 
-    Returns
-    -------
     Dataset over joint: ``computed``, ``printed``; the point itself in the attributes.
     """
     point = pitchfork(context.robot)
@@ -86,8 +82,6 @@ def critical_mode(context: Context, progress: Progress = silent) -> xr.Dataset:
 def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Critical k1 for the paper's variants (panel C) beside the paper's statements on the robot.
 
-    Returns
-    -------
     Dataset over variant: ``critical_k1``, ``error_bound``, ``robot_printed`` (N*mm/deg).
     """
     robots = printed.variant_robots(context.robot)
@@ -104,8 +98,6 @@ def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
 def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Critical k1 over the number of modules (panel D).
 
-    Returns
-    -------
     Dataset over modules: ``critical_k1``, ``error_bound`` (N*mm/deg; NaN where the straight walk does not lose
     stability through a pitchfork), ``says``; attribute ``built``, the number of the robot as built.
     """
@@ -132,8 +124,6 @@ def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
 def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The bifurcation for uniform springs (the paper's "Hopf"): amplitudes and phases of the undulation along the body.
 
-    Returns
-    -------
     Dataset over joint: ``amplitude`` (unit norm), ``phase`` (rad, relative to joint 1, positive leads); the point in
     the attributes.
     """

@@ -103,8 +103,6 @@ def settled_start(robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target],
     "bent", the settled walk; and "bent, aimed", with the target relative to the motion of module 1 instead of its
     heading.
 
-    Returns
-    -------
     Dataset over (task, start): ``start_nearest`` (m); over task: ``law_spring`` (N*mm/deg) and ``slip``, the mean
     angle from heading to motion of module 1 on the settled walk (rad).
     """
@@ -143,8 +141,6 @@ def farther_targets(
 
     One undisturbed trial each, with leg yaw, with a duration in proportion to the distance.
 
-    Returns
-    -------
     Dataset over (away, spring): ``nearest`` (m), ``effort`` until the earliest arrival of that distance, and
     ``effort_part``, its ratio to the effort of legs at their limit all the time (1); over away: ``earliest`` (s),
     ``k_hat`` by the law (N*mm/deg).
@@ -173,8 +169,6 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
     """Minima of each criterion of a :class:`TurningTask`, in means over repeats, at an instant: 0 is the earliest
     arrival, 1 the paper's 23 s, 2 each walk's own.
 
-    Returns
-    -------
     Dataset over criterion: the ``spring`` of the smallest mean; ``at``, the vertex of a parabola in 1/k1 through it and
     its neighbours (the spring itself at an end of the grid); ``softest`` and ``stiffest`` of the springs that are not
     worse by a t test (seed by seed), all in N*mm/deg, and ``alike``, their number; the best spring is one of them in

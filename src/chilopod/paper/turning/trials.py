@@ -269,8 +269,6 @@ def without_leg_yaw(
     """The task of :func:`turning_task` with and without leg yaw (Fig. "without": five trials and nine), at values of k1
     (N*mm/deg) by name.
 
-    Returns
-    -------
     Dataset over (case, trial, time): ``x`` and ``y`` of module 1 (m); over (case, trial): ``arrived``, ``nearest`` (m)
     and ``turned``, the last heading (rad, left positive). Cases are the names, each ``leg_yaw`` or not, with
     ``spring``; where there are fewer trials than nine the rest is NaN.
