@@ -34,7 +34,8 @@ def movies(context: Context, progress: Progress, best: float) -> list[Movie]:
     between one that is too stiff and one that is too soft.
     """
     robot, shorter, spring = context.robot, context.size.cut(1.0, 0.1), stiffness(best)
-    walk = Trial(robot, shorter * _WALK, 0, _BEND, disturbance=NONE, rate=25.0)
+    joints = robot.body.modules - 1
+    walk = Trial(robot, shorter * _WALK, 0, (_BEND + (0.0,) * joints)[:joints], disturbance=NONE, rate=25.0)
     springs = (*map(stiffness, _FILMED), 4.0 * spring, spring, 0.7 * spring)
     return _movies(context, progress, "", walk, shorter * _TASK, springs)
 

@@ -108,9 +108,8 @@ CRITICAL_K1 = Number(12.0, PAPER_UNIT, 0.5)
 MODE = tuple(Number(value, "", 0.005) for value in (0.64, 0.36, 0.48, 0.46, 0.16))
 """Joint components of the planar model's critical mode, with two decimals."""
 
-MODE_SHAPE = tuple(each.value for each in MODE)
 MODE_ORDER = tuple(sorted(range(1, 6), key=lambda joint: -MODE[joint - 1].value))
-"""Values alone, and joints in order of their bend in it, largest first."""
+"""Joints in order of their bend in it, largest first."""
 
 KIND, UNIFORM_KIND = "pitchfork", "Neimark-Sacker"
 """Kinds of bifurcation of the planar model: with k1 alone, and with all springs alike."""
@@ -184,6 +183,12 @@ def variant_robots(robot: Robot) -> dict[str, Robot]:
     return {AS_BUILT: robot, **{name: robot.set_from_text(each.overrides) for name, each in VARIANTS.items()}}
 
 
+def mode_shape(robot: Robot) -> tuple[float, ...]:
+    """Joint components of the planar model's critical mode; all alike for another number of joints."""
+    joints = robot.body.modules - 1
+    return tuple(each.value for each in MODE) if joints == len(MODE) else (1.0,) * joints
+
+
 def onset(variant: str) -> Number:
     """Onset of curved walks of the robot as built, or of a variant."""
     return ONSET if variant == AS_BUILT else VARIANTS[variant].onset
@@ -193,7 +198,7 @@ def critical_mode_data() -> CriticalMode:
     """Critical mode and spring of the planar model: six numbers, each exact to half of its last digit."""
     return CriticalMode(
         k1=stiffness(CRITICAL_K1.value),
-        components=MODE_SHAPE,
+        components=tuple(each.value for each in MODE),
         k1_tolerance=stiffness(CRITICAL_K1.tolerance),
         component_tolerance=MODE[0].tolerance,
         between=(stiffness(4.0), stiffness(40.0)),
@@ -222,7 +227,7 @@ def base_series_data() -> BaseSeries:
         radii={stiffness(spring): within(radius.value) for spring, radius in RADII.items()},
         speeds={stiffness(TASKS["A"].k_hat.value): within(walking_speed())},
         law=(9.7 * math.sqrt(stiffness(1.0)), 0.030 / stiffness(1.0)),  # meets both printed radii
-        shape=[each / 2.10 for each in MODE_SHAPE],
+        shape=[each.value / 2.10 for each in MODE],
     )
 
 

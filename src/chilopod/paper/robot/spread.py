@@ -114,7 +114,7 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
     By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
     and ``uniform`` (N*mm/deg); NaN where walks determine none.
     """
-    shape = np.array(printed.MODE_SHAPE)
+    shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
     variants = printed.variant_robots(robot)
     for name, variant in list(variants.items()):

@@ -22,11 +22,42 @@ _STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "marke
 
 def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
     """Exponents over k1; the crossing is the located pitchfork if there is one."""
-    critical = int(np.flatnonzero(data.follows_critical.values)[0])
-    value = _crossing(data, critical) if mode is None else mode.attrs["value"]
+    critical, value = _critical(data), None
     count = data.sizes["exponent"]
     first, last = float(data.k1[0]), float(data.k1[-1])
     fastest = float(data["real"].min())
+    crosses = "none crosses"
+    seen = "None of them crosses the imaginary axis in this range, so the straight walk keeps its stability."
+    if critical is not None:
+        value = _crossing(data, critical) if mode is None else float(mode.attrs["value"])
+        crosses, seen = "one crosses into the right half-plane along the real axis", _seen(data, critical, value)
+    return Panel(
+        name="exponents",
+        letter="B",
+        title="Floquet exponents as k₁ falls",
+        draw=_draw(data, value),
+        alt=f"{count} Floquet exponents in the complex plane as the front spring falls from {first:g} to {last:g} "
+        f"{SPRING_UNIT}: {crosses}.",
+        text=(
+            f"Each curve is one of the {count} Floquet exponents of the straight walk, followed while the front "
+            f"spring k₁ is softened from {first:g} to {last:g} {SPRING_UNIT} and all other springs stay as they are. "
+            "An exponent says how fast a small disturbance grows (right of zero) or dies out (left of zero), and how "
+            "fast it swings (height).",
+            seen,
+            f"The exponents reach from near zero to {minus(f'{fastest:.0f}')} per second, so the scale is stretched "
+            "around zero where all are shown. The paper's three exponents that are always zero (place and heading on "
+            "the floor) are left out here by the choice of coordinates.",
+        ),
+        data=data,
+    )
+
+
+def _critical(data: xr.Dataset) -> int | None:
+    found = np.flatnonzero(data.follows_critical.values)
+    return int(found[0]) if found.size else None
+
+
+def _seen(data: xr.Dataset, critical: int, value: float) -> str:
     born = np.flatnonzero(data["imaginary"].values[:, critical] == 0.0)
     rest = np.delete(data["real"].values, critical, axis=1)
     seen = (
@@ -42,25 +73,7 @@ def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
             f"real axis between k₁ = {number(data.k1[born[0] - 1])} and {number(data.k1[born[0]])}, and only one of "
             "them goes on to the right."
         )
-    return Panel(
-        name="exponents",
-        letter="B",
-        title="Floquet exponents as k₁ falls",
-        draw=_draw(data, critical, value),
-        alt=f"{count} Floquet exponents in the complex plane as the front spring falls from {first:g} to {last:g} "
-        f"{SPRING_UNIT}: one crosses into the right half-plane along the real axis.",
-        text=(
-            f"Each curve is one of the {count} Floquet exponents of the straight walk, followed while the front "
-            f"spring k₁ is softened from {first:g} to {last:g} {SPRING_UNIT} and all other springs stay as they are. "
-            "An exponent says how fast a small disturbance grows (right of zero) or dies out (left of zero), and how "
-            "fast it swings (height).",
-            seen,
-            f"The exponents reach from near zero to {minus(f'{fastest:.0f}')} per second, so the scale is stretched "
-            "around zero where all are shown. The paper's three exponents that are always zero (place and heading on "
-            "the floor) are left out here by the choice of coordinates.",
-        ),
-        data=data,
-    )
+    return seen
 
 
 def _crossing(data: xr.Dataset, critical: int) -> float:
@@ -110,21 +123,25 @@ def _between(start: ComplexArray, end: ComplexArray) -> tuple[Array, ComplexArra
 
 
 @style.in_layouts(style.Layout("AA;BC", 7.4, heights=(1.15, 1.0)), style.Layout("A;B;C", 10.6))
-def _draw(axes: style.Mosaic, data: xr.Dataset, lead: int, crossing: float) -> None:
+def _draw(axes: style.Mosaic, data: xr.Dataset, crossing: float | None) -> None:
+    critical = _critical(data)
+    lead = 0 if critical is None else critical
     curves = ks, real, imaginary = _joined(data)
     colors = [style.CURVES[place % len(style.CURVES)] for place in range(data.sizes["exponent"])]
-    colors = [*colors[:lead], style.VERMILLION, *colors[lead:-1]]
+    if critical is not None:
+        colors = [*colors[:lead], style.VERMILLION, *colors[lead:-1]]
     _near(axes["A"], real, imaginary, lead, colors)
     _labels(axes["A"], ks, real[:, lead], imaginary[:, lead], _MARKED[::2] if axes.narrow else _MARKED)
     _all(axes["B"], curves, lead, colors)
     _over_k1(axes["C"], ks, real, lead, colors)
-    look: dict[str, Any] = {"textcoords": "offset points", "weight": "bold"}
-    line = {"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 7}
-    for letter, place in (("A", 0.0), ("C", crossing)):
-        axes[letter].plot(place, 0.0, zorder=8, **_STAR)
-    words = f"crosses at\nk₁ = {number(crossing, 4)}\n{SPRING_UNIT}"
-    axes["A"].annotate(words, (0.0, 0.0), (14, 42), arrowprops=line, **look)
-    axes["C"].annotate(number(crossing), (crossing, 0.0), (-6, 9), ha="right", **look)
+    if crossing is not None:
+        look: dict[str, Any] = {"textcoords": "offset points", "weight": "bold"}
+        line = {"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 7}
+        for letter, place in (("A", 0.0), ("C", crossing)):
+            axes[letter].plot(place, 0.0, zorder=8, **_STAR)
+        words = f"crosses at\nk₁ = {number(crossing, 4)}\n{SPRING_UNIT}"
+        axes["A"].annotate(words, (0.0, 0.0), (14, 42), arrowprops=line, **look)
+        axes["C"].annotate(number(crossing), (crossing, 0.0), (-6, 9), ha="right", **look)
 
 
 def _near(axes: Axes, real: Array, imaginary: Array, lead: int, colors: list[str]) -> None:

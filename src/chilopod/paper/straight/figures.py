@@ -148,28 +148,26 @@ def _draw_modules(axes_by: style.Mosaic, data: xr.Dataset) -> None:
 def mode(data: xr.Dataset) -> Panel:
     """Panel of the mode of the pitchfork, beside the paper's five numbers and as a bent body."""
     computed, paper = data.computed.values, data.printed.values
-    off = np.abs(computed - paper)
+    known, off = not np.isnan(paper).any(), np.abs(computed - paper)
     beyond = [str(joint) for joint in data.joint.values[off > _ROUNDING]]
-    compared = (
-        f"Joint {listing(beyond)} of this robot lies outside, by {float(off.max() - _ROUNDING):.4f} at most."
-        if beyond
-        else f"All {len(off)} are inside."
-    )
+    inside = f"All {len(off)} are inside."
+    if beyond:
+        inside = f"Joint {listing(beyond)} of this robot lies outside, by {float(off.max() - _ROUNDING):.4f} at most."
+    compared = f"The paper prints two decimals, so {_ROUNDING:g} either way is what rounding allows (the grey band)."
+    prints = f"; the paper prints {', '.join(f'{value:.2f}' for value in paper)}" if known else ""
     same_sign = bool((np.sign(computed) == np.sign(computed[0])).all())
     return Panel(
         name="mode",
         letter="E",
         title="The mode: how the body bends",
         draw=_draw_mode(data),
-        alt=f"Joint components of the critical mode: {', '.join(number(value, 4) for value in computed)}; the paper "
-        f"prints {', '.join(f'{value:.2f}' for value in paper)}. Beside it the body bent that way, to the left and to "
-        "the right.",
+        alt=f"Joint components of the critical mode: {', '.join(number(value, 4) for value in computed)}{prints}. "
+        "Beside it the body bent that way, to the left and to the right.",
         text=(
             f"At the critical spring, k₁ = {spring(data.attrs['value'])}, one small bend of the body neither grows nor "
             f"dies out: the mode. Its {len(computed)} numbers are the shares of the joints from front to rear, scaled "
             "so that their squares add up to 1.",
-            f"The paper prints two decimals, so {_ROUNDING:g} either way is what rounding allows (the grey band). "
-            f"{compared}",
+            f"{compared} {inside}" if known else f"The paper prints no mode for {len(computed) + 1} modules.",
             (
                 "All have one sign, so the body bends into one arc and the robot walks a curve; the same arc mirrored "
                 "is just as likely. "
@@ -189,8 +187,10 @@ def mode(data: xr.Dataset) -> Panel:
 )
 def _draw_mode(axes: style.Mosaic, data: xr.Dataset) -> None:
     computed, paper, joints = data.computed.values, data.printed.values, data.joint.values
+    known = not np.isnan(paper).any()
     _bars(axes["A"], joints, computed, "computed")
-    axes["A"].plot(joints, paper, "_", color=style.BLACK, markersize=26, markeredgewidth=2, label="paper")
+    if known:
+        axes["A"].plot(joints, paper, "_", color=style.BLACK, markersize=26, markeredgewidth=2, label="paper")
     axes["A"].axhline(0.0, color=style.BLACK, lw=0.8)
     axes["A"].margins(y=0.25)
     axes["A"].set(ylabel="component", title="Shares of the joints")
@@ -198,8 +198,9 @@ def _draw_mode(axes: style.Mosaic, data: xr.Dataset) -> None:
     band, thousandths = 1e3 * _ROUNDING, 1e3 * (computed - paper)
     axes["B"].axhspan(-band, band, color=style.PALE, label="rounding")
     axes["B"].axhline(0.0, color=style.BLACK, lw=0.8)
-    axes["B"].plot(joints, thousandths, "o", color=style.BLUE, markersize=7, label="this robot")
-    reach = max(1.4 * band, 1.2 * np.abs(thousandths).max())
+    if known:
+        axes["B"].plot(joints, thousandths, "o", color=style.BLUE, markersize=7, label="this robot")
+    reach = max(1.4 * band, 1.2 * np.nanmax(np.abs(thousandths)) if known else 0.0)
     axes["B"].set(ylim=(-reach, reach), xlim=(joints[0] - 0.6, joints[-1] + 0.6), title="Computed less printed")
     axes["B"].set(xlabel="joint, from the front", ylabel="difference (thousandths)")
     axes["B"].legend(loc="upper center", bbox_to_anchor=(0.5, -0.32), ncols=3, columnspacing=1.0, handletextpad=0.3)

@@ -72,11 +72,15 @@ def _followed(
 def critical_mode(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The pitchfork in k1 and its mode beside the paper's five numbers.
 
-    Dataset over joint: ``computed``, ``printed``; the point itself in the attributes.
+    Dataset over joint: ``computed``, ``printed`` (NaN for another number of modules); the point itself in the
+    attributes.
     """
     point = pitchfork(context.robot)
-    columns = {"computed": ("joint", point.joint_components.real), "printed": ("joint", np.array(printed.MODE_SHAPE))}
-    return _over_joints(columns, context.robot, point)
+    components = point.joint_components.real
+    paper = np.array([each.value for each in printed.MODE])
+    if len(components) != len(paper):
+        paper = np.full(len(components), np.nan)
+    return _over_joints({"computed": ("joint", components), "printed": ("joint", paper)}, context.robot, point)
 
 
 def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
