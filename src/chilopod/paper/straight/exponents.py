@@ -189,8 +189,7 @@ def _all(axes: Axes, curves: tuple[Array, Array, Array], lead: int, colors: list
         axes.plot(real[0, index], imaginary[0, index], "o", color="white", markeredgecolor=colors[index], markersize=6)
         axes.plot(real[-1, index], imaginary[-1, index], "o", color=colors[index], markersize=3.5)
     axes.set(xlabel="real part (1/s)", ylabel="imaginary part (rad/s)")
-    ends = ((ks[0], "white", 6), (ks[-1], style.BLACK, 4))
-    for k1, fill, size in ends:
+    for k1, fill, size in ((ks[0], "white", 6), (ks[-1], style.BLACK, 4)):
         look: dict[str, Any] = {"markeredgecolor": style.BLACK, "markersize": size, "label": f"k₁ = {k1:g}"}
         axes.plot([], [], "o", color=fill, **look)
     axes.legend(loc="upper left", handletextpad=0.2, borderaxespad=0.1)

@@ -39,8 +39,7 @@ _TOP, _TOP_HOPF = (41, 15, 10, 7, 5), (41, 10, 5, 3, 2)  # N*mm/deg, on the uppe
 
 def panels(found: Turning) -> list[Panel]:
     """All figures, in the paper's order."""
-    both = (criteria(found, letter) for letter in "AB")
-    return [turning(found), *both, without(found), comparison(found), why(found)]
+    return [turning(found), *(criteria(found, each) for each in "AB"), without(found), comparison(found), why(found)]
 
 
 def turning(found: Turning) -> Panel:
@@ -121,8 +120,7 @@ def _run(axes: Axes, time: Array, x: Array, y: Array, until: float, color: str) 
 
 def _target(axes: Axes, x: float, y: float) -> None:
     """Target, and circle within which it counts as reached."""
-    circle = Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=style.BLACK, lw=1.0, linestyle=DASHED, zorder=5)
-    axes.add_patch(circle)
+    axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=style.BLACK, lw=1.0, linestyle=DASHED, zorder=5))
     axes.plot(x, y, "+", color=style.BLACK, markersize=9, markeredgewidth=1.6, zorder=6)
 
 
@@ -393,8 +391,7 @@ def _draw_why(axes: style.Mosaic, settled: xr.Dataset, farther: xr.Dataset) -> N
     axes["A"].set_yticks(rows, [str(start).replace(", ", ",\n") for start in settled.start.values])
     axes["A"].set(ylim=(rows[-1] + 0.55, -0.55), xlim=(0.0, 1.2 * float(settled.start_nearest.max())))
     axes["A"].axvline(ARRIVAL_RADIUS, color=style.BLACK, lw=0.9, linestyle=DASHED)
-    title = "A  Start, no leg yaw"
-    finish(axes["A"], "x", "lower right", xlabel="nearest distance of the target (m)", title=title)
+    finish(axes["A"], "x", "lower right", xlabel="nearest distance of the target (m)", title="A  Start, no leg yaw")
     for row, (color, dash) in zip(farther.effort_part.values, _CURVES, strict=False):
         look: dict[str, Any] = {"color": color, "linestyle": dash, "marker": "o", "markersize": 4}
         axes["B"].plot(1.0 / farther.spring.values, 100.0 * row, **look)
