@@ -115,10 +115,8 @@ def example_walks(
 def shares(data: xr.Dataset) -> xr.Dataset:
     """Shares of the walks that are ``curved`` and ``straight``, over spring."""
     found = {"curved": is_curved(data), "straight": (data.direction == "straight").values}
-    return xr.Dataset(
-        {name: ("spring", here.mean(axis=1), {"units": "1"}) for name, here in found.items()},
-        coords={"spring": data.spring},
-    )
+    columns = {name: ("spring", here.mean(axis=1), {"units": "1"}) for name, here in found.items()}
+    return xr.Dataset(columns, {"spring": data.spring})
 
 
 def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:

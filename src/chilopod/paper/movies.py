@@ -64,16 +64,8 @@ def _movies(
     names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
     fps = _QUICK_FPS if context.size is Size.QUICK else Movie.fps
     titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))
+    first, second = "One spring decides how the robot walks", f"Turning to a target, {TASK_A}"
     return [
-        Movie(
-            f"{prefix}movie-1",
-            "One spring decides how the robot walks",
-            titles[:3],
-            together(records[:3]),
-            2.0,
-            fps,
-            size=(1280, 400),
-            follow=True,
-        ),
-        Movie(f"{prefix}movie-2", f"Turning to a target, {TASK_A}", titles[3:], together(records[3:]), 1.0, fps),
+        Movie(f"{prefix}movie-1", first, titles[:3], together(records[:3]), 2.0, fps, size=(1280, 400), follow=True),
+        Movie(f"{prefix}movie-2", second, titles[3:], together(records[3:]), 1.0, fps),
     ]

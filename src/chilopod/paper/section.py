@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -179,12 +180,8 @@ def reproduce(
     while left:
         section = next(filter(ready, left), left[0]) if found.seconds else left[0]
         left.remove(section)
-        started = time.perf_counter()
-        progress(section.sentence, 0.0, section.sentence)
-
-        def report(done: float, words: str, section: Section[Any] = section) -> None:
-            progress(section.sentence, done, words)
-
+        started, report = time.perf_counter(), partial(progress, section.sentence)
+        report(0.0, section.sentence)
         try:
             found.add(section, report)
         except OutputError:  # where nothing can be written any more, no other section fares better
@@ -192,6 +189,6 @@ def reproduce(
         except Exception as error:
             found.failures[section] = error
         found.seconds[section] = time.perf_counter() - started
-        progress(section.sentence, 1.0, "failed" if section in found.failures else "done")
+        report(1.0, "failed" if section in found.failures else "done")
         callback(found, section)
     return found

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.analysis.square_root import SquareRootFit
@@ -16,6 +15,7 @@ from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.printed import Band
 from chilopod.show import style
+from chilopod.show.style import finish as finish
 from chilopod.show.words import SPRING_UNIT, k, typeset
 from chilopod.statistics import means
 
@@ -28,19 +28,6 @@ WALKS: Final = (style.Layout("AB;CD", 7.4), style.Layout("A;B;C;D", 13.6))
 
 JOINTS: Final = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 """Layouts of the paper's Fig. "absolute"."""
-
-
-def finish(axes: Axes, grid: Literal["both", "x", "y"] = "both", legend: Any = None, **look: Any) -> None:
-    """Labels, title and limits of axes, lines to read values by, and a legend if a place for it is given."""
-    axes.set(**look)
-    axes.grid(True, axis=grid)
-    if legend:
-        axes.legend(loc=legend)
-
-
-def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
-    """Legend of some axes below the whole figure."""
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns)
 
 
 def errorbars(
@@ -65,7 +52,7 @@ def _inverse(x: ArrayLike) -> Array:
     return 1.0 / np.maximum(np.asarray(x, dtype=np.float64), 1e-9)
 
 
-def draw_examples(axes: Mapping[str, Axes], examples: xr.Dataset, narrow: bool) -> None:
+def draw_examples(axes: style.Mosaic, examples: xr.Dataset) -> None:
     """Joint angles (deg) over time of a straight walk in A and of a curved one in B, on one scale."""
     for letter, what, spring in zip("AB", ("Straight", "Curved"), examples.spring.values, strict=True):
         for joint, (color, _) in zip(examples.joint.values, style.joint_styles(examples.sizes["joint"]), strict=True):
@@ -77,7 +64,7 @@ def draw_examples(axes: Mapping[str, Axes], examples: xr.Dataset, narrow: bool) 
     low, high = zip(*(axes[letter].get_ylim() for letter in "AB"), strict=True)
     for letter in "AB":
         axes[letter].set_ylim(min(low), max(high))
-    axes["A"].legend(loc="upper left", ncols=2 if narrow else 3)
+    axes["A"].legend(loc="upper left", ncols=2 if axes.narrow else 3)
 
 
 def draw_fork(

@@ -54,14 +54,11 @@ def _of_task(letter: str, task: printed.Task) -> TaskStatements:
         became = Said(words, "the same at these springs, and all repeats arrive")
     else:
         became = Said(f"best around {k_hat}", "arrives there; stiffer miss outside, softer inside")
-    return TaskStatements(
-        _number(f"{name}: k1 whose walk has the radius of the circle", k_hat, _PREDICTED),
-        Statement(f"{name}: what becomes of it", became, _PREDICTED),
-        {
-            key: Statement(f"{name}: smallest {title}", task.minima, _PREDICTED)
-            for key, title in CRITERION_NAMES.items()
-        },
-    )
+    own = _number(f"{name}: k1 whose walk has the radius of the circle", k_hat, _PREDICTED)
+    minima = {
+        key: Statement(f"{name}: smallest {title}", task.minima, _PREDICTED) for key, title in CRITERION_NAMES.items()
+    }
+    return TaskStatements(own, Statement(f"{name}: what becomes of it", became, _PREDICTED), minima)
 
 
 def listed(springs: Sequence[float]) -> str:
@@ -81,17 +78,10 @@ RADII = {
     spring: _number(f"radius at k1 = {spring:g} {PAPER_UNIT}", radius, _FITTED)
     for spring, radius in printed.RADII.items()
 }
-_SPEED = walking_speed()
-SPEED: Statement[Band] = Statement(
-    f"speed of module 1 at k1 = {printed.TASKS['A'].k_hat}",
-    Band(
-        f"{_SPEED:.3f} m/s, from {printed.ARRIVAL} to {printed.TASKS['A'].target}",
-        f"{100.0 * printed.SPEED:.0f} %",
-        (1.0 - printed.SPEED) * _SPEED,
-        (1.0 + printed.SPEED) * _SPEED,
-    ),
-    _FITTED,
-)
+_SPEED, _WITHIN = walking_speed(), printed.SPEED
+_SAID = f"{_SPEED:.3f} m/s, from {printed.ARRIVAL} to {printed.TASKS['A'].target}"
+_AROUND = Band(_SAID, f"{100.0 * _WITHIN:.0f} %", (1.0 - _WITHIN) * _SPEED, (1.0 + _WITHIN) * _SPEED)
+SPEED: Statement[Band] = Statement(f"speed of module 1 at k1 = {printed.TASKS['A'].k_hat}", _AROUND, _FITTED)
 RISING = _said("angle of joint 1 over 1/k1", "increases", "from every spring to the next")
 FLUCTUATION = _said(
     "fluctuation among trials over 1/k1, joint 1", "increases", "from the stiffest spring that curves to the softest"
@@ -117,9 +107,7 @@ WITHOUT = _said(
     f"at most {printed.WITHOUT_LEG_YAW // 2} arrive without, all with",
 )
 HOPF = _said(
-    "task A, pitchfork against Hopf: smallest criteria",
-    "lower for the pitchfork, all three",
-    "all three lower",
+    "task A, pitchfork against Hopf: smallest criteria", "lower for the pitchfork, all three", "all three lower"
 )
 HOPF_SPRINGS = _said(
     "task A, Hopf: springs of the smallest criteria",
@@ -131,11 +119,8 @@ NUMERICS: Statement[Band] = Statement(
 )
 """Statement on the largest relative move."""
 
-PLANAR_LIMIT: Statement[Band] = Statement(
-    "planar limit of the twin: where the straight walk is lost",
-    Band("no counterpart", "3 % of the planar model", 0.97, 1.03),
-    _CHECKED,
-)
+_LIMIT = Band("no counterpart", "3 % of the planar model", 0.97, 1.03)
+PLANAR_LIMIT: Statement[Band] = Statement("planar limit of the twin: where the straight walk is lost", _LIMIT, _CHECKED)
 """Point of the twin's planar limit over that of the planar model."""
 
 ORDER: tuple[Statement[Said], ...] = (

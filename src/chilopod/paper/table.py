@@ -163,18 +163,19 @@ def of_twin(statement: Statement[Band], result: Result, reading: str = "") -> Of
 
 
 def estimated(
-    statement: Statement[Band], found: Estimate, unit: str, digits: int = 2, words: str = "", reading: str = ""
+    statement: Statement[Band], found: Estimate, unit: str, digits: int = 2, words: str = "", none: str = ""
 ) -> OfTwin:
-    """A number from trials beside the band in which it is to lie, in its words, or as a number."""
-    result = Result(words, found.value, found.error, unit, digits)
-    if not np.isfinite(found.value):
-        return OfTwin(statement, result, Verdict.NOT_DETERMINED, reading)
-    return compared(statement, result, found.between(statement.said.low, statement.said.high), reading)
+    """A number from trials beside the band in which it is to lie, in its words, or as a number; words for ``none``."""
+    known = np.isfinite(found.value)
+    result = Result(words if known else none or words, found.value, found.error, unit, digits)
+    if not known:
+        return OfTwin(statement, result, Verdict.NOT_DETERMINED)
+    return compared(statement, result, found.between(statement.said.low, statement.said.high))
 
 
-def compared(statement: Statement[Said], result: Result, comparison: Comparison, reading: str = "") -> OfTwin:
+def compared(statement: Statement[Said], result: Result, comparison: Comparison) -> OfTwin:
     """A result with a verdict that rests on trials that scatter."""
-    return OfTwin(statement, result, within(comparison.answer), reading, comparison)
+    return OfTwin(statement, result, within(comparison.answer), comparison=comparison)
 
 
 def robot_rows(

@@ -63,29 +63,24 @@ def files_of_map(folder: str | Path) -> list[Path]:
 
 
 def write_map(found: StabilityMap, shown: Sequence[str], folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write a map as ``map.nc``, its grid as ``map.csv``, its curves as ``map-curves.csv``, and some of its pictures as
-    ``map.svg`` and ``map.png``; files and errors as of :func:`chilopod.output.write_all`."""
+    """Write a map as ``map.nc``, its grid as ``map.csv``, its curves as ``map-curves.csv``, and its pictures of
+    some names, see :meth:`StabilityMap.plot`, as ``map.svg`` and ``map.png``; files and errors as of
+    :func:`chilopod.output.write_all`."""
     data = found.to_dataset()
     about = data.assign_attrs({"robot_toml": ""})
     del about.attrs["robot_toml"]
     table = about.drop_dims("point", errors="ignore")
     curves = about.drop_dims(["x", "y"])
     with style.house_style():
-        drawn = _draw_map(found, shown)
-        pictures = style.svg(drawn, "map"), style.png(drawn)
+        figure = Figure(figsize=(_MAP[0] * len(shown), _MAP[1]), layout="constrained")
+        axes = figure.subplots(1, len(shown), squeeze=False)[0]
+        for each, name in zip(axes, shown, strict=True):
+            draw(found, each, name)
+        columns = _KEYS_IN_ROW if len(shown) > 1 else _KEYS_IN_ROW // 2
+        figure.legend(handles=keys(found, axes[0]), loc="outside lower center", ncols=columns)
+        pictures = style.svg(figure, "map"), style.png(figure)
     contents = netcdf(data), csv(table).encode(), csv(curves).encode(), *pictures
     return write_all(zip(files_of_map(folder), contents, strict=True), replace=replace)
-
-
-def _draw_map(found: StabilityMap, shown: Sequence[str]) -> Figure:
-    """Pictures of a map by their names, see :meth:`StabilityMap.plot`."""
-    figure = Figure(figsize=(_MAP[0] * len(shown), _MAP[1]), layout="constrained")
-    axes = figure.subplots(1, len(shown), squeeze=False)[0]
-    for each, name in zip(axes, shown, strict=True):
-        draw(found, each, name)
-    columns = _KEYS_IN_ROW if len(shown) > 1 else _KEYS_IN_ROW // 2
-    figure.legend(handles=keys(found, axes[0]), loc="outside lower center", ncols=columns)
-    return figure
 
 
 def panel_files(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import xarray as xr
-from matplotlib.figure import Figure
+
+from chilopod.show.style import Drawing
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Panel:
 
     name: str  # of its files
     title: str
-    draw: Callable[[bool], Figure]  # narrow if told so; within :func:`chilopod.show.style.house_style`
+    draw: Drawing  # within :func:`chilopod.show.style.house_style`
     alt: str  # description for readers who cannot see it
     text: tuple[str, ...]  # paragraphs beside it
     data: xr.Dataset  # that are drawn

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import wraps
+from typing import Any, Concatenate, Final, Literal, ParamSpec
 
 import matplotlib as mpl
 import numpy as np
@@ -15,6 +16,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.style import context as styled
 from numpy.typing import NDArray
+
+P = ParamSpec("P")
+Drawing = Callable[[bool], Figure]  # narrow if told so
 
 # Okabe and Ito (2008), told apart with every common colour vision; its yellow is too pale on white.
 BLACK: Final = "#1a1a1a"
@@ -105,6 +109,40 @@ def figure(wide: Layout, narrow: Layout, is_narrow: bool) -> tuple[Figure, dict[
     return drawn, axes
 
 
+class Mosaic(dict[str, Axes]):
+    """Axes of a figure by letter."""
+
+    def __init__(self, wide: Layout, narrow: Layout, is_narrow: bool) -> None:
+        self.figure, axes = figure(wide, narrow, is_narrow)
+        self.narrow = is_narrow
+        super().__init__(axes)
+
+    def legend_below(self, letter: str, columns: int, narrow: int = 1, **look: Any) -> None:
+        """Legend of some axes below the whole figure, with so many columns in each layout."""
+        handles, count = self[letter].get_legend_handles_labels(), narrow if self.narrow else columns
+        self.figure.legend(*handles, loc="outside lower center", ncols=count, **look)
+
+
+def in_layouts(
+    wide: Layout, narrow: Layout
+) -> Callable[[Callable[Concatenate[Mosaic, P], None]], Callable[P, Drawing]]:
+    """Decorator of a function that draws on the axes of a figure: with its other arguments, the figure in a layout."""
+
+    def decorated(draw: Callable[Concatenate[Mosaic, P], None]) -> Callable[P, Drawing]:
+        @wraps(draw)
+        def of(*args: P.args, **named: P.kwargs) -> Drawing:
+            def drawn(is_narrow: bool) -> Figure:
+                axes = Mosaic(wide, narrow, is_narrow)
+                draw(axes, *args, **named)
+                return axes.figure
+
+            return drawn
+
+        return of
+
+    return decorated
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """Context in which figures look alike under any settings of the user's matplotlib."""
@@ -140,6 +178,14 @@ def bare(axes: Axes) -> None:
     """Turn axes into a drawing: equal scales, no frame, at the left of its space, below its title."""
     axes.set_aspect("equal", anchor="W")
     axes.axis("off")
+
+
+def finish(axes: Axes, grid: Literal["both", "x", "y"] = "both", legend: Any = None, **look: Any) -> None:
+    """Labels, title and limits of axes, lines to read values by, and a legend if a place for it is given."""
+    axes.set(**look)
+    axes.grid(True, axis=grid)
+    if legend:
+        axes.legend(loc=legend)
 
 
 def note(axes: Axes, text: str, at: tuple[float, float], away: tuple[float, float], **look: Any) -> None:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from itertools import groupby
+from typing import SupportsFloat
 
 SPRING_UNIT = "N·mm/deg"
 
@@ -13,10 +14,10 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
-def number(value: float, digits: int = 3) -> str:
+def number(value: SupportsFloat, digits: int = 3) -> str:
     """Number with some significant digits, trailing zeros included, and a true minus sign."""
-    text = f"{value:#.{digits}g}".rstrip(".")
-    return minus(text if "e" not in text else f"{value:.{digits - 1}e}")
+    text = f"{float(value):#.{digits}g}".rstrip(".")
+    return minus(text if "e" not in text else f"{float(value):.{digits - 1}e}")
 
 
 def round_down(value: float) -> float:
@@ -35,7 +36,7 @@ def minus(text: str) -> str:
     return text.replace("-", "−")
 
 
-def spring(value: float, digits: int = 4) -> str:
+def spring(value: SupportsFloat, digits: int = 4) -> str:
     """A spring constant with its unit."""
     return f"{number(value, digits)}\u00a0{SPRING_UNIT}"
 
@@ -48,13 +49,11 @@ def k(joint: int) -> str:
 def typeset(text: str) -> str:
     """Text of the studies with proper signs for units, powers and springs, and no break between number and unit."""
     text = text.replace("*", "·").replace("k2-5", "k₂–k₅").replace(" deg", "°").replace("critical k1", "critical k₁")
-    text = re.sub(r"(\d)e([-+]?)0*(\d+)", lambda found: _power(found[1], found[2], found[3]), text)
+    text = re.sub(
+        r"(\d)e\+?(-?)0*(\d+)", lambda found: f"{found[1]}×10{(found[2] + found[3]).translate(_SUPERSCRIPTS)}", text
+    )
     text = re.sub(r"(?<![\w.])-(?=\d)", "−", text)
     return re.sub(r"([\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:N·|mm|cm|s\b|rad/s|%))", "\\1\u00a0", text)
-
-
-def _power(digit: str, sign: str, power: str) -> str:
-    return f"{digit}×10{(sign.strip('+') + power).translate(_SUPERSCRIPTS)}"
 
 
 def spans(counts: Sequence[int]) -> str:

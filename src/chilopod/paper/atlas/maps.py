@@ -113,7 +113,7 @@ def words(letter: str, found: StabilityMap) -> str:
     y = np.concatenate([curve.values[:, 1] for curve in found.curves])
     x = found.x.shown(np.concatenate([curve.values[:, 0] for curve in found.curves]))
     ends = x[np.isclose(y, found.y.low)], x[np.isclose(y, found.y.high)]
-    low, high = (number(float(each.max()), 3) if each.size else "none" for each in ends)
+    low, high = (number(each.max(), 3) if each.size else "none" for each in ends)
     return CHARTS[letter].words.format(low=low, high=high, least=number(x.min(), 3), most=number(x.max(), 3))
 
 

@@ -16,13 +16,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from chilopod.analysis.parameters import ALL, PAPER_UNIT, spring_scale, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.paper.section import Context, Section
-from chilopod.paper.shapes import DASHED, DOTTED, finish, legend_below
+from chilopod.paper.shapes import DASHED, DOTTED, finish
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.show import style
@@ -93,8 +92,6 @@ def predicted(robot: Robot, curves: xr.Dataset) -> float:
 def collapse(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Critical k1 over the other springs for :data:`ROBOTS`, and over inertia for three strides.
 
-    Returns
-    -------
     Dataset: ``curve`` over (robot, rest), and ``law`` over (stride, mass), in units of the scale; ``scale`` over robot;
     ``inertia`` over mass.
     """
@@ -115,15 +112,13 @@ def collapse(context: Context, progress: Progress = silent) -> xr.Dataset:
     curves = [[at(float(each), **factors) for each in rest] for factors in ROBOTS.values()]
     law = [[at(built, mass=float(mass), stride=stride) for mass in masses] for stride in strides]
     scales = [spring_scale(scaled(robot, **factors)) / stiffness(1.0) for factors in ROBOTS.values()]
-    return xr.Dataset(
-        {
-            "curve": (("robot", "rest"), np.array(curves)),
-            "scale": ("robot", np.array(scales), {"units": PAPER_UNIT}),
-            "law": (("stride", "mass"), np.array(law)),
-            "inertia": ("mass", [inertia(scaled(robot, mass=float(mass))) for mass in masses]),
-        },
-        coords={"robot": list(ROBOTS), "rest": rest, "mass": masses, "stride": list(strides)},
-    )
+    columns = {
+        "curve": (("robot", "rest"), np.array(curves)),
+        "scale": ("robot", np.array(scales), {"units": PAPER_UNIT}),
+        "law": (("stride", "mass"), np.array(law)),
+        "inertia": ("mass", [inertia(scaled(robot, mass=float(mass))) for mass in masses]),
+    }
+    return xr.Dataset(columns, {"robot": list(ROBOTS), "rest": rest, "mass": masses, "stride": list(strides)})
 
 
 def panel(data: xr.Dataset) -> Panel:
@@ -134,7 +129,7 @@ def panel(data: xr.Dataset) -> Panel:
     return Panel(
         name="scaling",
         title="One law for robots of all sizes",
-        draw=lambda narrow: _draw(data, narrow),
+        draw=_draw(data),
         alt=f"Critical springs of {len(ROBOTS)} robots, which differ {number(scale.max() / scale.min(), 2)} times, and "
         f"the same in units of friction, speed, duty factor and module length, where they agree to {spread}.",
         text=(
@@ -149,8 +144,8 @@ def panel(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(style.Layout("AB;CC", 7.2), style.Layout("A;B;C", 10.6), narrow)
+@style.in_layouts(style.Layout("AB;CC", 7.2), style.Layout("A;B;C", 10.6))
+def _draw(axes: style.Mosaic, data: xr.Dataset) -> None:
     for row, (color, marker) in enumerate(zip(_COLORS, _MARKERS, strict=False)):
         each = data.isel(robot=row)
         look: dict[str, Any] = {"color": color, "marker": marker, "markersize": 4.0, "label": str(each.robot.values)}
@@ -164,8 +159,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     axes["C"].axvline(float(data.inertia.interp(mass=1.0)), color=style.GREY, lw=1.0, label="inertia as built")
     labels: dict[str, Any] = {"xlabel": "inertia, m / (2βcT)", "ylabel": "critical k₁ / scale"}
     finish(axes["C"], title="C", ylim=(0.0, None), legend="upper left", **labels)
-    legend_below(figure, axes["A"], 1 if narrow else 3)
-    return figure
+    axes.legend_below("A", 3)
 
 
 SCALING: Section[xr.Dataset] = Section(

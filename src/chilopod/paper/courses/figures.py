@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from chilopod.frozen import Array
 from chilopod.paper.courses.rows import (
@@ -22,15 +21,13 @@ from chilopod.paper.courses.rows import (
     verdicts,
 )
 from chilopod.paper.courses.study import USUAL, Robust
-from chilopod.paper.shapes import finish, legend_below
+from chilopod.paper.shapes import finish
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import listing, number, spring
 from chilopod.statistics import Interval
 from chilopod.steering import STRATEGIES, VARIABLE
 
-_STRATEGIES = (style.Layout("ABC", 3.4, widths=(1.2, 1.0, 1.0)), style.Layout("A;B;C", 8.6))
-_WHERE = (style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
 _TITLES = {
     VARIABLE.name: "k₁ set on the way",
     "pitchfork": "one k₁",
@@ -41,8 +38,6 @@ _TITLES = {
 _BEARINGS = np.linspace(-75.0, 75.0, 11)  # deg
 _AWAY = np.linspace(0.8, 2.0, 7)  # m
 _FEWEST = 0.1  # of the targets of a field that are missed where the map's text speaks of it
-_BOTH = (style.Layout("AB", 4.0, widths=(0.8, 1.0)), style.Layout("A;B", 8.4, heights=(0.6, 1.0)))
-_ONE = (style.Layout("A", 2.8), style.Layout("A", 3.4))
 _STEP_TITLES = (
     "spring of\nthe circle",
     "+ the bend\nthere is",
@@ -65,7 +60,7 @@ def strategies(data: xr.Dataset) -> Panel:
     return Panel(
         name="courses" if planar else "robot-courses",
         title="One target after another" + ("" if planar else ": the robot in three dimensions"),
-        draw=lambda narrow: _draw(found, narrow),
+        draw=_draw(found),
         alt=f"A: shares of targets and of whole courses that each strategy reaches. B: time for a target that is "
         f"reached. C: work of the actuators. The spring that is set on the way reaches {percent(ours.targets)} of "
         "targets.",
@@ -83,15 +78,16 @@ def strategies(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw(found: dict[str, Summary], narrow: bool) -> Figure:
-    figure, axes = style.figure(*_STRATEGIES, narrow)
+@style.in_layouts(style.Layout("ABC", 3.4, widths=(1.2, 1.0, 1.0)), style.Layout("A;B;C", 8.6))
+def _draw(axes: style.Mosaic, found: dict[str, Summary]) -> None:
     each = list(found.values())
     rows = np.arange(len(each), dtype=np.float64)
     titles = [_TITLES[one.name] + ("" if np.isnan(one.spring) else f" = {one.spring:g}") for one in each]
     _reached(axes["A"], [one.targets for one in each], [one.courses for one in each], "A  Reached")
     axes["A"].legend(loc="best")
-    intervals(axes["B"], [one.seconds for one in each], rows - 0.12, style.BLUE, "o", "on it")
-    intervals(axes["B"], [one.spent for one in each], rows + 0.12, style.ORANGE, "s", "on it and those missed")
+    intervals(axes["B"], [one.seconds for one in each], rows - 0.12, "o", color=style.BLUE, label="on it")
+    spent, label = [one.spent for one in each], "on it and those missed"
+    intervals(axes["B"], spent, rows + 0.12, "s", color=style.ORANGE, label=label)
     finish(axes["B"], "x", "upper right", xlabel="time for a target reached (s)", title="B  Time")
     left = np.zeros(len(each))
     for name, color in (("spring", style.BLUE), ("drive", style.ORANGE)):
@@ -100,18 +96,17 @@ def _draw(found: dict[str, Summary], narrow: bool) -> Figure:
         left += work
     finish(axes["C"], "x", "best", xlabel="work a course (J)", title="C  Work of the actuators")
     for letter, one in axes.items():
-        one.set_yticks(rows, titles if narrow or letter == "A" else [""] * len(rows))
+        one.set_yticks(rows, titles if axes.narrow or letter == "A" else [""] * len(rows))
         one.set_ylim(len(rows) - 0.5, -0.5)
         if letter != "A":
             one.set_xlim(left=0.0)
-    return figure
 
 
 def _reached(axes: Axes, targets: Sequence[Interval], courses: Sequence[Interval], title: str) -> None:
     """Shares of targets and of whole courses, a row each."""
     rows = np.arange(len(targets), dtype=np.float64)
-    intervals(axes, targets, rows - 0.12, style.BLUE, "o", "targets", 100.0)
-    intervals(axes, courses, rows + 0.12, style.ORANGE, "s", "whole courses", 100.0)
+    intervals(axes, targets, rows - 0.12, "o", 100.0, color=style.BLUE, label="targets")
+    intervals(axes, courses, rows + 0.12, "s", 100.0, color=style.ORANGE, label="whole courses")
     _scaled(axes, len(rows), title)
 
 
@@ -119,21 +114,11 @@ def _scaled(axes: Axes, rows: int, title: str) -> None:
     finish(axes, "x", xlim=(-3.0, 103.0), ylim=(rows - 0.5, -0.5), xlabel="reached (%)", title=title)
 
 
-def intervals(
-    axes: Axes,
-    found: Sequence[Interval],
-    rows: Array,
-    color: str,
-    marker: str,
-    label: str = "",
-    scale: float = 1.0,
-    alpha: float = 1.0,
-) -> None:
+def intervals(axes: Axes, found: Sequence[Interval], rows: Array, marker: str, scale: float = 1.0, **look: Any) -> None:
     """Values with their intervals, a row each."""
     value, low, high = (scale * np.array([getattr(each, name) for each in found]) for name in ("value", "low", "high"))
     bars = np.maximum(0.0, np.array([value - low, high - value]))
-    look: dict[str, Any] = {"color": color, "markersize": 5, "elinewidth": 1.4, "capsize": 2.5, "alpha": alpha}
-    axes.errorbar(value, rows, xerr=bars, fmt=marker, label=label or None, **look)
+    axes.errorbar(value, rows, xerr=bars, fmt=marker, markersize=5, elinewidth=1.4, capsize=2.5, **look)
 
 
 def where(data: xr.Dataset) -> Panel:
@@ -141,22 +126,18 @@ def where(data: xr.Dataset) -> Panel:
     shown = (VARIABLE.name, STRATEGIES["pitchfork"].name)
     maps = {name: share_map(data.sel(case=name)) for name in shown}
     ours, fixed = (maps[name] for name in shown)
-    missed = _missed(ours)
+    missed, few = _missed(ours), _percent(_FEWEST)
+    said = f"more than {few} are missed {missed}." if missed else f"none misses more than {few}."
     return Panel(
         name="courses-where",
         title="Where targets are missed",
-        draw=lambda narrow: _draw_where(maps, narrow),
+        draw=_draw_where(maps),
         alt="Maps of the share of targets that are reached over angle and distance at which they are put up: with the "
         "spring that is set on the way, and with one spring for all.",
         text=(
             "Targets by the angle and distance at which they are put up. One spring for all of a course is that of one "
             f"circle: fields of its map range from {_percent(np.nanmin(fixed))} to {_percent(np.nanmax(fixed))}. With "
-            f"the spring that is set on the way the lowest has {_percent(np.nanmin(ours))}; "
-            + (
-                f"more than {_percent(_FEWEST)} are missed {missed}."
-                if missed
-                else f"none misses more than {_percent(_FEWEST)}."
-            ),
+            f"the spring that is set on the way the lowest has {_percent(np.nanmin(ours))}; {said}",
         ),
         data=xr.Dataset(
             {"reached": (("strategy", "away", "bearing"), np.stack(list(maps.values())), {"units": "1"})},
@@ -192,16 +173,15 @@ def _percent(share: float) -> str:
     return f"{number(100.0 * share, 3)}\u00a0%" if share < 1.0 else "100\u00a0%"
 
 
-def _draw_where(maps: dict[str, Array], narrow: bool) -> Figure:
-    figure, axes = style.figure(*_WHERE, narrow)
+@style.in_layouts(style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
+def _draw_where(axes: style.Mosaic, maps: dict[str, Array]) -> None:
     for letter, (name, share) in zip("AB", maps.items(), strict=True):
         mesh = axes[letter].pcolormesh(_BEARINGS, _AWAY, 100.0 * share, vmin=0.0, vmax=100.0, cmap="viridis")
         title = f"{letter}  {_TITLES[name]}"
         axes[letter].set(xlabel="angle of the target (deg)", ylabel="distance (m)", title=title)
         axes[letter].set_xticks([-75, -45, -15, 15, 45, 75])
         axes[letter].invert_xaxis()  # left is left
-    figure.colorbar(mesh, ax=list(axes.values()), label="targets reached (%)", shrink=0.8)
-    return figure
+    axes.figure.colorbar(mesh, ax=list(axes.values()), label="targets reached (%)", shrink=0.8)
 
 
 def robust(found: Robust) -> Panel:
@@ -211,7 +191,7 @@ def robust(found: Robust) -> Panel:
     return Panel(
         name="courses-robust",
         title="What the spring law owes to its steps, and what it stands",
-        draw=lambda narrow: _draw_robust(found, narrow),
+        draw=_draw_robust(found),
         alt="A: targets and courses reached by the law as it grew. B: the same under conditions that the law does not "
         "know of, beside one spring for all of a course.",
         text=(
@@ -229,7 +209,7 @@ def whole(conditions: xr.Dataset) -> Panel:
     return Panel(
         name="robot-courses-robust",
         title="What the spring that is set on the way stands: the robot in three dimensions",
-        draw=lambda narrow: _draw_whole(conditions, narrow),
+        draw=_draw_whole(conditions),
         alt="Targets and courses reached under several conditions, with the spring that is set on the way and with one "
         "for all.",
         text=(f"{conditions.sizes['course']} courses under each condition. " + _decided(conditions),),
@@ -249,37 +229,30 @@ def _decided(data: xr.Dataset) -> str:
         (other,) = (each for each in data.strategy.values if each != VARIABLE.name)
         if share.above(share_of_targets(data.sel(condition=name, strategy=other).arrived)) is True:
             better.append(str(name))
-    fixed = spring(data.attrs["spring"], 2)
+    fewer = f"with {listing(worse)}" if worse else "under none of these conditions"
+    more = f"beyond doubt under {f'these: {listing(better)}' if better else 'none'}"
+    if len(better) == data.sizes["condition"]:
+        more = "under every one of them"
     return (
-        f"As usual it reaches {percent(usual)} of targets; "
-        + (f"clearly fewer with {listing(worse)}" if worse else "clearly fewer under none of these conditions")
-        + f". It reaches more than {fixed} all along "
-        + (
-            "under every one of them."
-            if len(better) == data.sizes["condition"]
-            else f"beyond doubt under these: {listing(better)}."
-            if better
-            else "beyond doubt under none."
-        )
+        f"As usual it reaches {percent(usual)} of targets; clearly fewer {fewer}. It reaches more than "
+        f"{spring(data.attrs['spring'], 2)} all along {more}."
     )
 
 
-def _draw_robust(found: Robust, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_BOTH, narrow)
+@style.in_layouts(style.Layout("AB", 4.0, widths=(0.8, 1.0)), style.Layout("A;B", 8.4, heights=(0.6, 1.0)))
+def _draw_robust(axes: style.Mosaic, found: Robust) -> None:
     arrived = [found.courses.arrived.isel(case=row) for row in range(found.courses.sizes["case"])]
     targets, courses = ([share(each) for each in arrived] for share in (share_of_targets, share_of_courses))
     _reached(axes["A"], targets, courses, "A  The law, step by step")
     axes["A"].set_yticks(range(len(arrived)), list(_STEP_TITLES[: len(arrived)]))
     _conditions(axes["B"], found.conditions, "B  Under other conditions")
-    legend_below(figure, axes["B"], 1 if narrow else 4)
-    return figure
+    axes.legend_below("B", 4)
 
 
-def _draw_whole(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_ONE, narrow)
+@style.in_layouts(style.Layout("A", 2.8), style.Layout("A", 3.4))
+def _draw_whole(axes: style.Mosaic, data: xr.Dataset) -> None:
     _conditions(axes["A"], data, "")
-    legend_below(figure, axes["A"], 1 if narrow else 4)
-    return figure
+    axes.legend_below("A", 4)
 
 
 def _conditions(axes: Axes, data: xr.Dataset, title: str) -> None:
@@ -291,7 +264,7 @@ def _conditions(axes: Axes, data: xr.Dataset, title: str) -> None:
             (share_of_targets, style.BLUE, "o", "targets"),
             (share_of_courses, style.ORANGE, "s", "courses"),
         ):
-            shares = [share(each) for each in arrived]
-            intervals(axes, shares, rows + shift, color, marker, f"{label}, {what}", 100.0, fill)
+            shares, look = [share(each) for each in arrived], {"label": f"{label}, {what}", "alpha": fill}
+            intervals(axes, shares, rows + shift, marker, 100.0, color=color, **look)
     axes.set_yticks(rows, [str(each) for each in data.condition.values])
     _scaled(axes, len(rows), title)

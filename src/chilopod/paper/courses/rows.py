@@ -142,14 +142,10 @@ def compared_rows(data: xr.Dataset) -> list[Row]:
     """A line for every strategy, and the comparisons that the intervals decide."""
     found, where = summaries(data), "" if data.attrs["engine"] == "planar" else ", the whole robot"
     count = f"{data.sizes['course']} courses of {data.sizes['goal']} targets{where}"
+    remark = "where the intervals of 95 % decide it, for legs that yaw by 5 deg at most"
     return [
         *(unprinted(f"{count}: {each.title}", _words(each), _WHERE, _remark(each)) for each in found.values()),
-        unprinted(
-            f"{count}: the variable spring",
-            decisions(verdicts(found)),
-            _WHERE,
-            "where the intervals of 95 % decide it, for legs that yaw by 5 deg at most",
-        ),
+        unprinted(f"{count}: the variable spring", decisions(verdicts(found)), _WHERE, remark),
     ]
 
 

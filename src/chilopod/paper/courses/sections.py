@@ -22,10 +22,6 @@ _BEST, _WHOLE_BEST = 14.0, 24.0
 _FILMED = "eight"  # of the courses of chilopod.steering
 
 
-def _compared(context: Context, report: Progress) -> xr.Dataset:
-    return compared(context, prepared(context), PLANAR[context.size], report)
-
-
 def _robust(context: Context, report: Progress, found: xr.Dataset | None) -> Robust:
     variable, seeds = prepared(context), context.size.of(*study.PLANAR_COURSES)
     best, conditions = best_fixed(found, _BEST), study.planar_conditions(context.robot)
@@ -65,7 +61,7 @@ COURSES: Section[xr.Dataset] = Section(
     "courses",
     CHAPTER,
     "random courses: a spring set on the way beside what does without",
-    _compared,
+    lambda context, report: compared(context, prepared(context), PLANAR[context.size], report),
     compared_rows,
     figures.panels,
     beyond=True,

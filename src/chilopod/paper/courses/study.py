@@ -134,8 +134,6 @@ def driven(context: Context, cases: Sequence[Case], seeds: Sequence[int], progre
 def compared(context: Context, variable: Driver, plan: Plan, progress: Progress = silent) -> xr.Dataset:
     """All strategies on the same courses; ``variable`` is the one of :func:`prepared`.
 
-    Returns
-    -------
     Dataset of :func:`driven` with :data:`chilopod.steering.ON_COURSES` as cases, with their ``spring`` (N*mm/deg, NaN
     without one to choose) and ``cost``, the steering cost of transport of all courses. Over (tried): ``tried_case``,
     ``tried_spring`` (N*mm/deg), and ``tried_arrived``, the share of reached targets of other courses.

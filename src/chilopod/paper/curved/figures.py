@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from chilopod.frozen import Array
 from chilopod.paper import printed, shapes
@@ -20,8 +19,6 @@ from chilopod.statistics import means
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
 
-_ONSET = (style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
-_VARIANTS = (style.Layout("AB;CC", 6.6, heights=(1.5, 1.0)), style.Layout("A;B;C", 11.6))
 _STYLES = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.PURPLE), "os^D", strict=True))
 _MARKED = (41.0, 15.0, 11.0, 9.0, 7.0)  # springs on a short scale
 _SIDES = {"right": (style.BLACK, "o", "trials"), "left": (style.BLACK, "o", ""), "straight": (style.BLACK, "o", "")}
@@ -40,8 +37,7 @@ def walks(study: CurvedStudy) -> Panel:
     unsettled = int((~trials.settled).sum())
     straight, curved = (float(value) for value in study.examples.spring.values)
     stiff = trials.spring.values > exact
-    if here.any():
-        wider, softest, stiffest = fluctuation(trials)
+    wider, softest, stiffest = fluctuation(trials)
     tighter = [
         number(radius.value / float(axis_radius(study.branch, exact * at / printed.ONSET.value)), 2)
         for at, radius in printed.RADII.items()
@@ -49,7 +45,7 @@ def walks(study: CurvedStudy) -> Panel:
     return Panel(
         name="curved-walks",
         title="Curved walks below the critical spring",
-        draw=lambda narrow: _draw_walks(study, narrow),
+        draw=_draw_walks(study),
         alt=f"A and B: joint angles over time at {k(1)} = {straight:g} and {curved:g}. C: mean angle of joint 1 over "
         f"1/{k(1)}, trials on the exact branches to both sides. D: radius of the body axis, trials on the branch, the "
         "paper's robot well above.",
@@ -72,9 +68,7 @@ def walks(study: CurvedStudy) -> Panel:
             f"{number(softest, 2)}, beside that at {spring(stiffest)}, is {wider}: uneven feet leave a straight walk "
             "straight and only move the critical spring of a trial a little, and the bend depends on that most where "
             "it rises steeply, beside the critical spring.",
-        )
-        if here.any()
-        else ("No trial ended in a curve.",),
+        ),
         data=trials.drop_vars("end_state"),
     )
 
@@ -84,7 +78,7 @@ def joints(study: CurvedStudy) -> Panel:
     return Panel(
         name="curved-joints",
         title="All joints of the curved walk",
-        draw=lambda narrow: _draw_joints(study, narrow),
+        draw=_draw_joints(study),
         alt=f"Mean absolute angles of all joints over 1/{k(1)}: zero up to the critical spring, then rising steeply.",
         text=(
             "Mean absolute angle of every joint, trials (means, standard errors) on the exact walks (lines). In the "
@@ -105,15 +99,15 @@ def onset(study: CurvedStudy) -> Panel:
     return Panel(
         name="curved-onset",
         title="How sure the square-root fit is",
-        draw=lambda narrow: _draw_onset(study, narrow),
-        alt=f"Critical spring by the fit over ranges of springs, from {number(float(near.critical_k1), 4)} to "
-        f"{number(float(wide.critical_k1), 4)}, beside the exact {number(exact, 4)}; and the power with which the bend "
+        draw=_draw_onset(study),
+        alt=f"Critical spring by the fit over ranges of springs, from {number(near.critical_k1, 4)} to "
+        f"{number(wide.critical_k1, 4)}, beside the exact {number(exact, 4)}; and the power with which the bend "
         f"grows, {number(power, 1)} instead of one half.",
         text=(
             "A square root is what a supercritical pitchfork promises close by. How close? Fitted to all trials it "
-            f"gives {number(float(wide.critical_k1), 4)} ± {number(float(wide.trial_error), 1)} {SPRING_UNIT}, to "
-            f"those of the two stiffest curved springs {number(float(near.critical_k1), 4)} ± "
-            f"{number(float(near.trial_error), 1)}; the point itself is at {number(exact, 6)}. The error bars tell "
+            f"gives {number(wide.critical_k1, 4)} ± {number(wide.trial_error, 1)} {SPRING_UNIT}, to "
+            f"those of the two stiffest curved springs {number(near.critical_k1, 4)} ± "
+            f"{number(near.trial_error, 1)}; the point itself is at {number(exact, 6)}. The error bars tell "
             "how well another set of trials would repeat the fit, not how far the law is off: fitted to the exact "
             "walks of the same springs, without any noise, it is off as much (open dots). More trials do not help, "
             "only springs closer to the point do.",
@@ -133,21 +127,20 @@ def variants(study: CurvedStudy) -> Panel:
     each = [(name, data.isel(variant=row)) for row, name in enumerate(names)]
     changes = listing(f"{signed(100 * (float(at.equal_ratio) - 1), 1)}\u00a0% for {name}" for name, at in each[1:])
     fits = listing(
-        f"{number(float(at.fitted_k1), 4)} instead of {number(float(at.exact_k1), 4)} for {name} "
-        f"(robot {number(float(at.robot_k1), 2)})"
+        f"{number(at.fitted_k1, 4)} instead of {number(at.exact_k1, 4)} for {name} (robot {number(at.robot_k1, 2)})"
         for name, at in each
     )
     most = names[int(np.abs(data.equal_ratio.values - 1.0).argmax())]
     stiff = int((data.fitted_k1 > data.exact_k1).sum())
     folded = [
-        f"{name} (up to {spring(float(at.stiffest_k1), 4)})"
+        f"{name} (up to {spring(at.stiffest_k1, 4)})"
         for name, at in each
         if float(at.stiffest_k1) > float(at.exact_k1) * (1.0 + 1e-9)
     ]
     return Panel(
         name="curved-variants",
         title="Curved walks of the paper's variants",
-        draw=lambda narrow: _draw_variants(study, narrow),
+        draw=_draw_variants(study),
         alt=f"Radius of the body axis for four variants, over 1/{k(1)} and over critical {k(1)} / {k(1)}, where the "
         "curves nearly fall together; and the critical spring of each, fitted and exact.",
         text=(
@@ -175,9 +168,9 @@ def _along(study: CurvedStudy) -> tuple[Array, Array]:
     return grid, np.rad2deg(on_branch(study.branch, "mean_angle", 1.0 / grid))
 
 
-def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
-    figure, axes = style.figure(*shapes.WALKS, narrow)
-    shapes.draw_examples(axes, study.examples, narrow)
+@style.in_layouts(*shapes.WALKS)
+def _draw_walks(axes: style.Mosaic, study: CurvedStudy) -> None:
+    shapes.draw_examples(axes, study.examples)
     trials, exact = study.trials, study.trials.attrs["critical_k1"]
     grid, angles = _along(study)
 
@@ -201,20 +194,18 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
     for at, (name, value) in zip(places, printed.RADII.items(), strict=True):
         style.note(axes["D"], f"{k(1)} = {name:g}", (at, value.value), (0, 9), ha="center")
     axes["D"].set(xlim=(0.97, exact * grid[-1] + 0.04), ylim=(0.0, 1.6), xlabel=f"critical {k(1)} / {k(1)}")
-    return figure
 
 
-def _draw_joints(study: CurvedStudy, narrow: bool) -> Figure:
-    figure, axes = style.figure(*shapes.JOINTS, narrow)
+@style.in_layouts(*shapes.JOINTS)
+def _draw_joints(axes: style.Mosaic, study: CurvedStudy) -> None:
     trials, (grid, angles) = study.trials, _along(study)
     shapes.draw_joints(axes["A"], trials, is_curved(trials) | (trials.direction.values == "straight"), grid, angles)
     axes["A"].set_xlim(0.9 / trials.spring.values.max(), grid[-1] + 0.005)
-    shapes.over_compliance(axes["A"], _MARKED if narrow else (41.0, 20.0, 15.0, 13.0, 11.0, 10.0, 9.0, 8.0, 7.0))
-    return figure
+    shapes.over_compliance(axes["A"], _MARKED if axes.narrow else (41.0, 20.0, 15.0, 13.0, 11.0, 10.0, 9.0, 8.0, 7.0))
 
 
-def _draw_onset(study: CurvedStudy, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_ONSET, narrow)
+@style.in_layouts(style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
+def _draw_onset(axes: style.Mosaic, study: CurvedStudy) -> None:
     fits, law, exact = study.fits, study.law, study.fits.attrs["exact_k1"]
     below, along = (100.0 * (1.0 - each.softest.values / exact) for each in (fits, law))
     axes["A"].semilogx(along, law.critical_k1.values, color=style.ORANGE, label="fit to exact walks, evenly spread")
@@ -236,11 +227,10 @@ def _draw_onset(study: CurvedStudy, narrow: bool) -> Figure:
     axes["B"].set_xlabel(f"{k(1)} below its critical value by (%)")
     for each in axes.values():
         each.xaxis.set_major_formatter(lambda value, position: f"{value:g}")
-    return figure
 
 
-def _draw_variants(study: CurvedStudy, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_VARIANTS, narrow)
+@style.in_layouts(style.Layout("AB;CC", 6.6, heights=(1.5, 1.0)), style.Layout("A;B;C", 11.6))
+def _draw_variants(axes: style.Mosaic, study: CurvedStudy) -> None:
     data = study.comparison
     for name, (color, marker) in zip(data.variant.values, _STYLES, strict=False):
         at, branch = data.sel(variant=name), study.branches[name]
@@ -256,23 +246,14 @@ def _draw_variants(study: CurvedStudy, narrow: bool) -> Figure:
     axes["A"].set(xlabel=f"1/{k(1)} ({shapes.INVERSE_UNIT})", title=f"A  Over 1/{k(1)}")
     axes["B"].set(xlabel=f"critical {k(1)} / {k(1)}", title="B  Over its own critical spring")
     axes["B"].legend(loc="upper right")
-    _draw_onsets(axes["C"], data, narrow)
-    return figure
+    _draw_onsets(axes["C"], data, axes.narrow)
 
 
 def _draw_onsets(axes: Axes, data: xr.Dataset, narrow: bool) -> None:
     rows = np.arange(data.sizes["variant"])
-    axes.errorbar(
-        data.fitted_k1,
-        rows - 0.12,
-        xerr=data.error,
-        fmt="o",
-        color=style.ORANGE,
-        markerfacecolor="white",
-        markeredgewidth=1.6,
-        capsize=2.5,
-        label="square-root fit to trials",
-    )
+    open_: dict[str, Any] = {"color": style.ORANGE, "markerfacecolor": "white", "markeredgewidth": 1.6, "capsize": 2.5}
+    label = "square-root fit to trials"
+    axes.errorbar(data.fitted_k1, rows - 0.12, xerr=data.error, fmt="o", label=label, **open_)
     axes.plot(data.exact_k1, rows + 0.12, "D", color=style.VERMILLION, label="pitchfork")
     look: dict[str, Any] = {"color": style.BLUE, "lw": 3.0, "zorder": 1, "label": "curved walks last up to here"}
     axes.hlines(rows + 0.12, data.exact_k1, data.stiffest_k1, **look)

@@ -35,33 +35,22 @@ def _model_rows(study: CurvedStudy) -> list[Row]:
     order, bends = bend_order(stiffest), np.abs(stiffest.mean_angle.values[is_curved(stiffest)]).mean(axis=0)
     shape = " ".join(f"{value:.2f}" for value in bends / np.linalg.norm(bends))
     below = law.sel(softest=0.99 * exact, method="nearest")
-    unsettled = int((~trials.settled).sum())
+    mode, unsettled = f"{', '.join(map(str, printed.MODE_ORDER))} (mode)", int((~trials.settled).sum())
+    bent = f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: {shape})"
+    grows = (
+        f"power {float(below.power):.2f} of the distance {100 * (1 - float(below.softest) / exact):.1f} % "
+        f"below, {float(law.power[0]):.2f} at {100 * (1 - float(law.softest[0]) / exact):.2g} %"
+    )
+    none = "not printed (robot: fitted by a square root of 1/k1)"
+    off, count = float(study.agreement.max()), int(study.agreement.notnull().sum())
+    remark = "with even feet: uneven ones make each trial's robot another one"
+    if unsettled:
+        remark += f"; of uneven ones {unsettled} of {trials.settled.size} had not settled"
+    said, where, verdict = Result(grows), printed.EXPERIMENTS, agreement(order == printed.MODE_ORDER)
     return [
-        Row(
-            "joints by how far they bend",
-            f"{', '.join(map(str, printed.MODE_ORDER))} (mode)",
-            Result(f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: {shape})"),
-            printed.ANALYSIS,
-            agreement(order == printed.MODE_ORDER),
-        ),
-        Row(
-            "how the bend of joint 1 grows from the point",
-            "not printed (robot: fitted by a square root of 1/k1)",
-            Result(
-                f"power {float(below.power):.2f} of the distance {100 * (1 - float(below.softest) / exact):.1f} % "
-                f"below, {float(law.power[0]):.2f} at {100 * (1 - float(law.softest[0]) / exact):.2g} %"
-            ),
-            printed.EXPERIMENTS,
-            Verdict.NOT_PRINTED,
-        ),
-        unprinted(
-            "where trials settle",
-            f"within {float(study.agreement.max()):.0e} rad of the branch, "
-            f"{int(study.agreement.notnull().sum())} trials",
-            printed.EXPERIMENTS,
-            "with even feet: uneven ones make each trial's robot another one"
-            + (f"; of uneven ones {unsettled} of {trials.settled.size} had not settled" if unsettled else ""),
-        ),
+        Row("joints by how far they bend", mode, Result(bent), printed.ANALYSIS, verdict),
+        Row("how the bend of joint 1 grows from the point", none, said, where, Verdict.NOT_PRINTED),
+        unprinted("where trials settle", f"within {off:.0e} rad of the branch, {count} trials", where, remark),
     ]
 
 

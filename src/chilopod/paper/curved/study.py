@@ -81,8 +81,6 @@ def curved_trials(
     A trial walks for a number of e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
     at most. All have seeds of their own, and by default the disturbance of all studies.
 
-    Returns
-    -------
     Dataset over spring (N*mm/deg), repeat, joint and state: ``mean_angle`` over the last 5 s (rad; NaN where the walk
     ended before), ``change`` (rad; largest of any joint against the mean over the 30 s before), ``settled``,
     ``axis_radius`` (m, the paper's (N-1) L / sum |theta|), ``direction`` (left, right, straight; empty where it had not
@@ -95,13 +93,8 @@ def curved_trials(
     records = spring_walks(robot, springs, durations, repeats=repeats, **walk)
     data = by_spring([_outcome(record, robot) for record in records], springs)
     data["duration"] = ("spring", np.array(durations), {"units": "s"})
-    data.attrs = {
-        "robot": robot.name,
-        "varied": K1,
-        "critical_k1": pitchfork(robot, normal_form=False).value,
-        "averaged_s": AVERAGED,
-        "about": "walks from straight on, averaged at their end",
-    }
+    exact, about = pitchfork(robot, normal_form=False).value, "walks from straight on, averaged at their end"
+    data.attrs = {"robot": robot.name, "varied": K1, "critical_k1": exact, "averaged_s": AVERAGED, "about": about}
     return data
 
 
@@ -112,8 +105,6 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     compared with the mirror image of the right one half a period later. The trials, from :func:`curved_trials`,
     have no spread of friction, as the branch has none.
 
-    Returns
-    -------
     Largest difference of any joint angle, rad, over (spring, repeat); NaN where the walk is straight or not settled.
     """
     joints = slice(3, robot.body.modules + 2)
@@ -183,18 +174,16 @@ def _outcome(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     straight = bend < STRAIGHT and bend <= max(np.abs(before).max(), _ROUNDING)
     settled = walk.status.item() == Status.WALKED.label and (straight or change <= SETTLED * bend)
     side = "straight" if straight else "right" if last.sum() > 0.0 else "left"
-    return xr.Dataset(
-        {
-            "mean_angle": ("joint", last, {"units": "rad"}),
-            "change": ((), change, {"units": "rad"}),
-            "settled": ((), settled),
-            "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
-            "direction": ((), np.array(side if settled else "", dtype=object)),
-            "status": ((), np.array(walk.status.item(), dtype=object)),
-            "end_state": ("state", _reduced(walk.isel(time=-1))),
-        },
-        coords={"joint": walk.joint.values},
-    )
+    columns = {
+        "mean_angle": ("joint", last, {"units": "rad"}),
+        "change": ((), change, {"units": "rad"}),
+        "settled": ((), settled),
+        "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
+        "direction": ((), np.array(side if settled else "", dtype=object)),
+        "status": ((), np.array(walk.status.item(), dtype=object)),
+        "end_state": ("state", _reduced(walk.isel(time=-1))),
+    }
+    return xr.Dataset(columns, {"joint": walk.joint.values})
 
 
 def _reduced(moment: xr.Dataset) -> Array:
@@ -283,8 +272,6 @@ def fitted(trials: xr.Dataset) -> SquareRootFit:
 def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     """The square-root fit over nested ranges of springs, from the pair nearest the point to all of them.
 
-    Returns
-    -------
     Dataset over softest (the softest spring fitted, N*mm/deg): ``critical_k1``, its ``error`` by the least squares and
     ``trial_error`` by the scatter of trials (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, the fit
     with every trial replaced by the exact walk of its spring (its error does not shrink with repeats), and ``trials``.
@@ -301,19 +288,15 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     *springs_, counts = np.array(rows, dtype=np.float64).T
     names = ("critical_k1", "error", "trial_error", "exact_walks")
     columns = {name: ("softest", each, {"units": PAPER_UNIT}) for name, each in zip(names, springs_, strict=True)}
-    return xr.Dataset(
-        {**columns, "trials": ("softest", counts.astype(int))},
-        coords={"softest": ("softest", softest, {"units": PAPER_UNIT})},
-        attrs={"robot": trials.attrs["robot"], "exact_k1": trials.attrs["critical_k1"]},
-    )
+    columns["trials"] = ("softest", counts.astype(int), {})
+    attrs = {"robot": trials.attrs["robot"], "exact_k1": trials.attrs["critical_k1"]}
+    return xr.Dataset(columns, {"softest": ("softest", softest, {"units": PAPER_UNIT})}, attrs)
 
 
 def law_along_branch(branch: xr.Dataset) -> xr.Dataset:
     """Error of the square-root law itself: fits to exact walks, evenly spread in 1/k, from the pitchfork to a softest
     spring.
 
-    Returns
-    -------
     Dataset over softest (N*mm/deg): ``critical_k1`` as fitted, ``angle`` of joint 1 there (rad), and ``power``, the
     slope of its logarithm over that of 1/k - 1/kc: one half where the law holds.
     """
@@ -325,22 +308,18 @@ def law_along_branch(branch: xr.Dataset) -> xr.Dataset:
         angles = on_branch(branch, "mean_angle", 1.0 / inverse)[:, 0]
         found.append((square_root_fit(inverse, angles).critical, angles[-1]))
     critical, angle = np.array(found).T
-    return xr.Dataset(
-        {
-            "critical_k1": ("softest", critical, {"units": PAPER_UNIT}),
-            "angle": ("softest", angle, {"units": "rad"}),
-            "power": ("softest", np.gradient(np.log(angle), np.log(1.0 / softest - 1.0 / exact)), {"units": "1"}),
-        },
-        coords={"softest": ("softest", softest, {"units": PAPER_UNIT})},
-        attrs={"robot": branch.attrs["robot"], "exact_k1": exact},
-    )
+    columns = {
+        "critical_k1": ("softest", critical, {"units": PAPER_UNIT}),
+        "angle": ("softest", angle, {"units": "rad"}),
+        "power": ("softest", np.gradient(np.log(angle), np.log(1.0 / softest - 1.0 / exact)), {"units": "1"}),
+    }
+    attrs = {"robot": branch.attrs["robot"], "exact_k1": exact}
+    return xr.Dataset(columns, {"softest": ("softest", softest, {"units": PAPER_UNIT})}, attrs)
 
 
 def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Changes by each of the paper's variants (Fig. "different").
 
-    Returns
-    -------
     Dataset over variant and ratio (of k1 to the variant's own critical one): ``fitted_k1`` with its ``error`` (by
     the scatter of trials), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1`` of the curved walks (above
     ``exact_k1`` where the branch folds back), all in N*mm/deg; ``criticality``; ``radius`` with ``radius_error``, mean
@@ -367,21 +346,17 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
         "stiffest_k1": [float(branch.parameter.max()) for branch in all_branches],
     }
     kinds = np.array([branch.attrs["criticality"] for branch in all_branches], dtype=object)
-    return xr.Dataset(
-        {
-            **{name: ("variant", np.array(values), {"units": PAPER_UNIT}) for name, values in springs.items()},
-            "criticality": ("variant", kinds),
-            "radius": (("variant", "ratio"), radius, {"units": "m"}),
-            "radius_error": (("variant", "ratio"), error, {"units": "m"}),
-            "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
-            "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
-        },
-        coords={
-            "variant": np.array(list(variants), dtype=object),
-            "ratio": variants[printed.AS_BUILT].spring.values / exact[0],
-        },
-        attrs={"robot": base.attrs["robot"], "spring": spring},
-    )
+    columns = {
+        **{name: ("variant", np.array(values), {"units": PAPER_UNIT}) for name, values in springs.items()},
+        "criticality": ("variant", kinds),
+        "radius": (("variant", "ratio"), radius, {"units": "m"}),
+        "radius_error": (("variant", "ratio"), error, {"units": "m"}),
+        "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
+        "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
+    }
+    ratios = variants[printed.AS_BUILT].spring.values / exact[0]
+    coords = {"variant": np.array(list(variants), dtype=object), "ratio": ratios}
+    return xr.Dataset(columns, coords, {"robot": base.attrs["robot"], "spring": spring})
 
 
 def axis_radius(branch: xr.Dataset, spring: float | Array) -> Array:

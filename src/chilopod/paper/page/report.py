@@ -24,7 +24,7 @@ from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size, nothing
 from chilopod.paper.straight import schematic
 from chilopod.record import load_xarray
-from chilopod.robot import Robot, load_robot, presets
+from chilopod.robot import load_robot, presets
 from chilopod.show import style
 from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
@@ -194,14 +194,15 @@ class Report:
     def _write(self, state: State) -> None:
         context, data = self._found.context, self.page.parent / "data"
         robot_file = data / "robot.toml"
-        name = context.robot.name if _is_preset(context.robot) else str(robot_file)
+        robot = context.robot
+        is_preset = robot.name in presets() and load_robot(robot.name) == robot
         shown = [self._shown[each] for each in self._sections if each in self._shown]
         waiting = [section for section in self._sections if section not in self._found]
         waiting += [section for section, _ in self._films]
         drawings = Drawings(self._headline, self._opening, shown, self.failures, waiting)
         taken = time.perf_counter() - self._begun if state is State.DONE else None
         said = "" if self._plan is None else self._plan.words(taken)
-        html = page(self._found, self._sections, drawings, name, state, said)
+        html = page(self._found, self._sections, drawings, robot.name if is_preset else str(robot_file), state, said)
         self._written += 1
         write_atomic(self.page, html)  # first: what is beside it is known by it to be ours
         write_atomic(robot_file, context.robot.to_toml())
@@ -214,10 +215,6 @@ def _again(draw: Callable[[], T]) -> T:
         return draw()
     except OutputError:
         return draw()
-
-
-def _is_preset(robot: Robot) -> bool:
-    return robot.name in presets() and load_robot(robot.name) == robot
 
 
 def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *, replace: bool = False) -> None:

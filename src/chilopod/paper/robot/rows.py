@@ -35,7 +35,7 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
         OfTwin(statements.STRAIGHT, Result(straight), within(most)),
         _curved(base),
         _spring(statements.ONSET, onset_point(base)),
-        *(_radius(base, spring, statement) for spring, statement in statements.RADII.items()),
+        *(estimated(said, radius_at(base, k), "m", none="no two trials curve") for k, said in statements.RADII.items()),
         estimated(statements.SPEED, mean(base.speed.sel(spring=PAPER_SPRING).values), "m/s", 4),
         compared(statements.RISING, Result(INCREASES[rising.answer]), rising),
         _fluctuation(base),
@@ -50,18 +50,18 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
     return rows + duration_rows(found.durations)
 
 
-def _spring(statement: Statement[Band], twin: Estimate, reading: str = "") -> OfTwin:
+def _spring(statement: Statement[Band], twin: Estimate) -> OfTwin:
     """Spring (N*mm/deg) beside the paper's; NaN if the trials determine no spring, or no error."""
     number = Result("", twin.value, twin.error, PAPER_UNIT, 1).words
     words = f"{number} ({100.0 * (twin.value / statement.said.middle - 1.0):+.0f} %)"
-    return estimated(statement, twin, PAPER_UNIT, 1, words if np.isfinite(twin.value) else "not determined", reading)
+    return estimated(statement, twin, PAPER_UNIT, 1, words, "not determined")
 
 
 def _uniform(mode: xr.Dataset) -> OfTwin:
     """Spring at which the straight walk ends by a mode, with all springs alike. Its error is no scatter of trials."""
     point = Estimate(float(mode.end), float(mode.end_error), reciprocal=True)
     reading = f"by {mode.mode.item()}s of {np.rad2deg(mode.amplitude):.0f} deg"
-    return replace(_spring(statements.UNIFORM, point, reading), comparison=None)
+    return replace(_spring(statements.UNIFORM, point), reading=reading, comparison=None)
 
 
 def _curved(base: xr.Dataset) -> OfTwin:
@@ -78,11 +78,6 @@ def _most(base: xr.Dataset, what: str, springs: tuple[float, ...]) -> tuple[str,
     pairs = zip(springs, repeats * share, strict=True)
     counts = ", ".join(f"{count:.0f} of {repeats} at {spring:g}" for spring, count in pairs)
     return f"{what}: {counts}", bool((share > 0.5).all())
-
-
-def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTwin:
-    found = radius_at(base, spring)
-    return estimated(statement, found, "m", words="no two trials curve" if np.isnan(found.value) else "")
 
 
 def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
@@ -119,10 +114,8 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
             f"{change(ratio.springs)} at equal springs, {listed(ratio.compared)}"
             + ("" if np.isnan(law) else f" (the robot's onsets alone would make it {change(Estimate(law))})")
         )
-    return [
-        _spring(said.onset, onset_point(data), reading),
-        estimated(said.radius, ratio.distance, "", words="; ".join(words), reading=reading),
-    ]
+    rows = [_spring(said.onset, onset_point(data)), estimated(said.radius, ratio.distance, "", words="; ".join(words))]
+    return [replace(row, reading=reading) for row in rows]
 
 
 def duration_rows(data: xr.Dataset) -> list[OfTwin]:
@@ -171,8 +164,7 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
         said = statements.TASKS[letter]
         if walks is not None:
             spring = spring_for(walks.base, task.target.radius)
-            words = "" if np.isfinite(spring.value) else "none of the springs walked"
-            rows.append(estimated(said.k_hat, spring, PAPER_UNIT, 1, words))
+            rows.append(estimated(said.k_hat, spring, PAPER_UNIT, 1, none="none of the springs walked"))
         words = outcome_words(task.criteria, lambda springs: ", ".join(f"{k:g}" for k in springs))
         rows.append(OfTwin(said.outcomes, Result(words), within(_became(task.criteria, printed.TASKS[letter]))))
         low = minima(task.criteria)

@@ -60,8 +60,6 @@ CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, 
 def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Predictions by the preset and by sets of constants drawn from both valleys; if not full, by one of each.
 
-    Returns
-    -------
     Dataset over set (0 the preset's), with the ``valley`` of each and by valley its number of ``effective`` samples:
     the constants (SI; ``unit`` is the unit of the robot file) by path over ``constant``, and predictions: over variant
     ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` as printed) and ``radius`` (over that as built, at an
@@ -80,6 +78,7 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
         progress(index / len(sets), f"set {index + 1} of {len(sets)}")
         rows.append({**predictions(other, folder, size=size), **nearest_springs(other, folder, size)})
     series = base_series_data()
+    numbers = len(series.radii) + len(series.speeds) + 1
     names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), WITH_FRICTION.paths
 
     def table(name: str, over: str, keys: list[str]) -> tuple[tuple[str, str], np.ndarray]:
@@ -99,11 +98,7 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
             "effective": ("from", [each.effective for each in samples.values()]),
         },
         coords={"set": np.arange(len(sets)), "constant": paths, "variant": names, "task": tasks, "from": list(samples)},
-        attrs={
-            "robot": robot.name,
-            "numbers": len(series.radii) + len(series.speeds) + 1,
-            "answers": len(series.curved) + len(series.straight),
-        },
+        attrs={"robot": robot.name, "numbers": numbers, "answers": len(series.curved) + len(series.straight)},
     )
 
 
@@ -163,8 +158,6 @@ def nearest_springs(robot: Robot, folder: Folder = None, size: Size = Size.FULL)
 def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Onset, radii and speeds with finer steps and a tighter solver; if not full, the first two cases only.
 
-    Returns
-    -------
     Dataset over case and spring: ``axis_radius`` (m) and ``speed`` of module 1 (m/s); over case: ``onset`` by the
     paper's method (N*mm/deg).
     """
@@ -181,15 +174,12 @@ def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
         speeds.append(found.speeds)
         radii.append(robot.axis_radius(found.bends))
         onsets.append(point_of(fitted(1.0 / np.array(springs), np.abs(found.bends[:, 0]))).value)
-    return xr.Dataset(
-        {
-            "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
-            "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
-            "onset": ("case", np.array(onsets), {"units": PAPER_UNIT}),
-        },
-        coords={"case": list(cases), "spring": over_springs(springs)},
-        attrs={"robot": robot.name},
-    )
+    columns = {
+        "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
+        "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
+        "onset": ("case", np.array(onsets), {"units": PAPER_UNIT}),
+    }
+    return xr.Dataset(columns, {"case": list(cases), "spring": over_springs(springs)}, {"robot": robot.name})
 
 
 def numeric_rows(data: xr.Dataset) -> list[OfTwin]:

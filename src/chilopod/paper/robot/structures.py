@@ -131,8 +131,6 @@ STRUCTURES = (
 def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Predictions by other structures, with constants fitted anew; if tiny, by one with the preset's constants.
 
-    Returns
-    -------
     Dataset over structure: ``misfit`` to the base series, with the preset's constants (``given``) and with its own
     (``fitted``), over ``fit``; ``constants`` (SI) over constant; over prediction, ``predicted`` and ``paper``
     (N*mm/deg); ``tighter``, radius with a module phase of 180 deg over that as built, at an equal distance from each

@@ -79,8 +79,6 @@ def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning
 def robot_strategies(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Task A with both strategies, for every limit of the legs' yaw; if not full, for the first one with fewer trials.
 
-    Returns
-    -------
     Dataset over limit (deg), instant and criterion: ``ratio``, ``low`` and ``high``, the results of
     :func:`chilopod.paper.turning.study.ratios`, and, over strategy too, ``smallest`` (m, rad, rad^2*s); over limit
     ``seconds``, the earliest arrival. Attribute: ``repeats``.
@@ -88,19 +86,12 @@ def robot_strategies(context: Context, progress: Progress = silent) -> xr.Datase
     repeats = context.size.of(STRATEGY_REPEATS, QUICK_REPEATS, 2)
     limits = context.size.of(LIMITS, LIMITS[:1], LIMITS[:1])
     springs = context.size.cut(STRATEGY_SPRINGS, {name: each[:1] for name, each in STRATEGY_SPRINGS.items()})
+    target, duration = printed.TASKS["A"].target, context.size.cut(TASK_DURATION, 6.0)
+    same: dict[str, Any] = {"duration": duration, "engine": "twin", "folder": context.folder}
     found = []
     for index, limit in enumerate(limits):
-        tasks = strategy_tasks(
-            context.whole,
-            printed.TASKS["A"].target,
-            springs,
-            repeats,
-            limit=float(np.deg2rad(limit)),
-            duration=context.size.cut(TASK_DURATION, 6.0),
-            engine="twin",
-            folder=context.folder,
-            progress=part(progress, index / len(limits), (index + 1) / len(limits), f"{limit:g} deg"),
-        )
+        same["progress"] = part(progress, index / len(limits), (index + 1) / len(limits), f"{limit:g} deg")
+        tasks = strategy_tasks(context.whole, target, springs, repeats, limit=float(np.deg2rad(limit)), **same)
         found.append(compared(tasks).assign_coords(limit=limit))
     return xr.concat(found, "limit").assign_attrs(robot=context.whole.name, repeats=repeats)
 

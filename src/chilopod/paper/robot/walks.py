@@ -133,8 +133,6 @@ def walk_ends(
 def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float]) -> xr.Dataset:
     """Results of the walks of :func:`walk_records` after shorter durations.
 
-    Returns
-    -------
     Dataset of :func:`over_durations`, after those of :data:`SHORTER` and the walks' own last.
     """
     last = float(records[0].time[-1])
@@ -145,8 +143,6 @@ def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[f
 def over_durations(series: Sequence[xr.Dataset], durations: Sequence[float]) -> xr.Dataset:
     """Results of the same walks after several durations (s).
 
-    Returns
-    -------
     Dataset over duration: ``onset`` with ``onset_error`` and its degrees of freedom ``onset_freedom``, N*mm/deg; over
     duration and spring: those of :func:`chilopod.paper.measures.shares`, and ``axis_radius`` with its error and
     freedom, as of :func:`chilopod.paper.measures.radius_at`, m.
@@ -181,8 +177,6 @@ def uniform_modes(
     """Leading modes of the straight walk with all springs alike, the stiffest first, and the spring at which each of
     them begins to grow: an undulation, and a bend, which may sway slowly from side to side.
 
-    Returns
-    -------
     Dataset over mode and spring (N*mm/deg): ``modulus`` of the multiplier of bends of :data:`AMPLITUDE`, half its
     interval of 95 % ``modulus_error``, and ``period`` of the mode (s, infinite where the multiplier may be real), NaN
     where the mode does not lead or the straight walk is lost; over mode ``end``, at which the modulus passes 1, and its
@@ -212,17 +206,15 @@ def uniform_modes(
     ends = np.array([_passes_one(springs, *each) for each in zip(modulus, error, strict=True)]).T
     with np.errstate(divide="ignore"):
         period = 2.0 * np.pi * robot.gait.period / turn
-    return xr.Dataset(
-        {
-            "modulus": (("mode", "spring"), modulus),
-            "modulus_error": (("mode", "spring"), error),
-            "period": (("mode", "spring"), period, {"units": "s"}),
-            "end": ("mode", ends[0], {"units": PAPER_UNIT}),
-            "end_error": ("mode", ends[1], {"units": PAPER_UNIT}),
-        },
-        coords={"mode": [UNDULATION, BEND], "spring": measures.over_springs(springs)},
-        attrs={"robot": robot.name, "amplitude": AMPLITUDE},
-    )
+    columns = {
+        "modulus": (("mode", "spring"), modulus),
+        "modulus_error": (("mode", "spring"), error),
+        "period": (("mode", "spring"), period, {"units": "s"}),
+        "end": ("mode", ends[0], {"units": PAPER_UNIT}),
+        "end_error": ("mode", ends[1], {"units": PAPER_UNIT}),
+    }
+    coords = {"mode": [UNDULATION, BEND], "spring": measures.over_springs(springs)}
+    return xr.Dataset(columns, coords, {"robot": robot.name, "amplitude": AMPLITUDE})
 
 
 def _leading(mode: CycleMode | None) -> tuple[float, float, float]:

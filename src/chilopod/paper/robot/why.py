@@ -235,8 +235,6 @@ def contributions(context: Context, progress: Progress = silent) -> xr.Dataset:
 
     Every subset is kept beside the folder of the trials.
 
-    Returns
-    -------
     Dataset over subset and factor: ``on``, True if a subset has a factor; over subset: :data:`ENDS`, the results of
     :func:`straight_end`; over factor: ``share``, by which the end is multiplied, ``share_low`` and ``share_high``, see
     :func:`over_orders`, ``share_error``, half an interval of 95 % by the errors of the ends, relative, ``alone`` and

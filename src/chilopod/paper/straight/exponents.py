@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from chilopod.frozen import Array, ComplexArray
@@ -16,8 +15,6 @@ from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, minus, number, spring
 
-_WIDE = style.Layout("AA;BC", 7.4, heights=(1.15, 1.0))
-_NARROW = style.Layout("A;B;C", 10.6)
 _MARKED = (75.0, 41.0, 28.0, 21.0, 15.0, 8.0, 4.0, 2.0)  # the paper's springs, and some below its crossing
 
 _STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "markeredgecolor": style.BLACK}
@@ -25,37 +22,22 @@ _STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "marke
 
 def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
     """Exponents over k1; the crossing is the located pitchfork if there is one."""
-    critical = _critical(data)
-    value = None if critical is None else _crossing(data, critical) if mode is None else mode.attrs["value"]
+    critical, value = _critical(data), None
     count = data.sizes["exponent"]
     first, last = float(data.k1[0]), float(data.k1[-1])
     fastest = float(data["real"].min())
-    if critical is None or value is None:
-        seen = "None of them crosses the imaginary axis in this range, so the straight walk keeps its stability."
-    else:
-        born = np.flatnonzero(data["imaginary"].values[:, critical] == 0.0)
-        paired = bool(born.size) and born[0] > 0
-        rest = np.delete(data["real"].values, critical, axis=1)
-        seen = (
-            f"The one in vermillion (the paper's red) passes zero along the real axis at k₁ = {spring(value)}: below "
-            "that spring a small bend no longer dies out but grows, to the left or to the right, without swinging. "
-            "With the walk's symmetry of left and right that makes it a pitchfork. "
-            + ("All others stay in the left half. " if (rest < 0.0).all() else "")
-        ) + (
-            "For stiff springs it is one of a complex pair, a bend that swings as it dies out; the two meet on the "
-            f"real axis between k₁ = {number(float(data.k1[born[0] - 1]))} and {number(float(data.k1[born[0]]))}, and "
-            "only one of them goes on to the right."
-            if paired
-            else ""
-        )
+    crosses = "none crosses"
+    seen = "None of them crosses the imaginary axis in this range, so the straight walk keeps its stability."
+    if critical is not None:
+        value = _crossing(data, critical) if mode is None else float(mode.attrs["value"])
+        crosses, seen = "one crosses into the right half-plane along the real axis", _seen(data, critical, value)
     return Panel(
         name="exponents",
         letter="B",
         title="Floquet exponents as k₁ falls",
-        draw=lambda narrow: _draw(data, value, narrow),
+        draw=_draw(data, value),
         alt=f"{count} Floquet exponents in the complex plane as the front spring falls from {first:g} to {last:g} "
-        + f"{SPRING_UNIT}: "
-        + ("one crosses into the right half-plane along the real axis." if critical is not None else "none crosses."),
+        f"{SPRING_UNIT}: {crosses}.",
         text=(
             f"Each curve is one of the {count} Floquet exponents of the straight walk, followed while the front "
             f"spring k₁ is softened from {first:g} to {last:g} {SPRING_UNIT} and all other springs stay as they are. "
@@ -73,6 +55,25 @@ def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
 def _critical(data: xr.Dataset) -> int | None:
     found = np.flatnonzero(data.follows_critical.values)
     return int(found[0]) if found.size else None
+
+
+def _seen(data: xr.Dataset, critical: int, value: float) -> str:
+    born = np.flatnonzero(data["imaginary"].values[:, critical] == 0.0)
+    rest = np.delete(data["real"].values, critical, axis=1)
+    seen = (
+        f"The one in vermillion (the paper's red) passes zero along the real axis at k₁ = {spring(value)}: below that "
+        "spring a small bend no longer dies out but grows, to the left or to the right, without swinging. With the "
+        "walk's symmetry of left and right that makes it a pitchfork. "
+    )
+    if (rest < 0.0).all():
+        seen += "All others stay in the left half. "
+    if born.size and born[0] > 0:
+        seen += (
+            "For stiff springs it is one of a complex pair, a bend that swings as it dies out; the two meet on the "
+            f"real axis between k₁ = {number(data.k1[born[0] - 1])} and {number(data.k1[born[0]])}, and only one of "
+            "them goes on to the right."
+        )
+    return seen
 
 
 def _crossing(data: xr.Dataset, critical: int) -> float:
@@ -121,16 +122,16 @@ def _between(start: ComplexArray, end: ComplexArray) -> tuple[Array, ComplexArra
     return share, between
 
 
-def _draw(data: xr.Dataset, crossing: float | None, narrow: bool) -> Figure:
-    figure, axes = style.figure(_WIDE, _NARROW, narrow)
+@style.in_layouts(style.Layout("AA;BC", 7.4, heights=(1.15, 1.0)), style.Layout("A;B;C", 10.6))
+def _draw(axes: style.Mosaic, data: xr.Dataset, crossing: float | None) -> None:
     critical = _critical(data)
-    lead = critical if critical is not None else 0
+    lead = 0 if critical is None else critical
     curves = ks, real, imaginary = _joined(data)
     colors = [style.CURVES[place % len(style.CURVES)] for place in range(data.sizes["exponent"])]
     if critical is not None:
-        colors = [*colors[:critical], style.VERMILLION, *colors[critical:-1]]
+        colors = [*colors[:lead], style.VERMILLION, *colors[lead:-1]]
     _near(axes["A"], real, imaginary, lead, colors)
-    _labels(axes["A"], ks, real[:, lead], imaginary[:, lead], _MARKED[::2] if narrow else _MARKED)
+    _labels(axes["A"], ks, real[:, lead], imaginary[:, lead], _MARKED[::2] if axes.narrow else _MARKED)
     _all(axes["B"], curves, lead, colors)
     _over_k1(axes["C"], ks, real, lead, colors)
     if crossing is not None:
@@ -141,7 +142,6 @@ def _draw(data: xr.Dataset, crossing: float | None, narrow: bool) -> Figure:
         words = f"crosses at\nk₁ = {number(crossing, 4)}\n{SPRING_UNIT}"
         axes["A"].annotate(words, (0.0, 0.0), (14, 42), arrowprops=line, **look)
         axes["C"].annotate(number(crossing), (crossing, 0.0), (-6, 9), ha="right", **look)
-    return figure
 
 
 def _near(axes: Axes, real: Array, imaginary: Array, lead: int, colors: list[str]) -> None:
@@ -189,8 +189,7 @@ def _all(axes: Axes, curves: tuple[Array, Array, Array], lead: int, colors: list
         axes.plot(real[0, index], imaginary[0, index], "o", color="white", markeredgecolor=colors[index], markersize=6)
         axes.plot(real[-1, index], imaginary[-1, index], "o", color=colors[index], markersize=3.5)
     axes.set(xlabel="real part (1/s)", ylabel="imaginary part (rad/s)")
-    ends = ((ks[0], "white", 6), (ks[-1], style.BLACK, 4))
-    for k1, fill, size in ends:
+    for k1, fill, size in ((ks[0], "white", 6), (ks[-1], style.BLACK, 4)):
         look: dict[str, Any] = {"markeredgecolor": style.BLACK, "markersize": size, "label": f"k₁ = {k1:g}"}
         axes.plot([], [], "o", color=fill, **look)
     axes.legend(loc="upper left", handletextpad=0.2, borderaxespad=0.1)

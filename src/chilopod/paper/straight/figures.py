@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from chilopod.paper import printed
@@ -18,13 +17,6 @@ from chilopod.show.panel import Panel
 from chilopod.show.scene.outline import chain, draw_heading, draw_joints, draw_modules, turned_about_tail
 from chilopod.show.words import SPRING_UNIT, k, listing, minus, number, signed, spans, spring, typeset
 
-_VARIANTS = (style.Layout("AB", 3.9, widths=(1.25, 1.0)), style.Layout("A;B", 7.4))
-_MODULES = (style.Layout("A", 3.6), style.Layout("A", 3.6))
-_MODE = (
-    style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0)),
-    style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9)),
-)
-_UNIFORM = (style.Layout("AB;CC", 6.4, heights=(1.0, 1.25)), style.Layout("A;B;C", 9.6, heights=(0.8, 0.8, 1.9)))
 _ROUNDING = printed.MODE[0].tolerance
 _DRAWN_BEND = 75.0  # degrees from head to tail: the mode leaves the size free
 _SNAPSHOTS = 8
@@ -45,7 +37,7 @@ def variants(data: xr.Dataset) -> Panel:
         name="variants",
         letter="C",
         title="Critical k₁ of the paper's variants",
-        draw=lambda narrow: _draw_variants(data, narrow),
+        draw=_draw_variants(data),
         alt="Critical front spring for four variants, planar model beside robot: "
         + listing(f"{name} {number(a)} against {b:g}" for name, a, b in zip(names, model, robot, strict=True))
         + f" {SPRING_UNIT}.",
@@ -67,8 +59,8 @@ def variants(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_VARIANTS, narrow)
+@style.in_layouts(style.Layout("AB", 3.9, widths=(1.25, 1.0)), style.Layout("A;B", 7.4))
+def _draw_variants(axes: style.Mosaic, data: xr.Dataset) -> None:
     names = [re.sub(r" (?=\d)", "\n", typeset(str(name))) for name in data.variant.values]
     rows = np.arange(len(names))
     both = np.array([data.critical_k1.values, data.robot_printed.values])
@@ -84,15 +76,14 @@ def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
             for value, row in list(zip(values, rows + shift, strict=True))[letter == "B" :]:
                 text = number(value, digits) if letter == "A" else f"{signed(value)} %"
                 style.note(axes[letter], text, (value, row), (away, 0), ha=side, va="center")
-        axes[letter].set_yticks(rows, names if narrow or letter == "A" else [""] * len(names))
+        axes[letter].set_yticks(rows, names if axes.narrow or letter == "A" else [""] * len(names))
         axes[letter].tick_params(axis="y", length=0)
         finish(axes[letter], "x", ylim=(rows[-1] + 0.55, -0.55))
     axes["A"].set(xlim=(0.0, 1.2 * both.max()), title="Critical value", xlabel=f"critical k₁ ({SPRING_UNIT})")
     axes["B"].set_xlim(1.45 * min(changes.min(), -5.0), max(1.2 * changes.max(), 3.0))
     axes["B"].set(title="Change from as built", xlabel="change of critical k₁ (%)")
     axes["B"].axvline(0.0, color=style.BLACK, lw=0.8)
-    figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside upper left", ncols=1 if narrow else 2)
-    return figure
+    axes.figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside upper left", ncols=1 if axes.narrow else 2)
 
 
 def modules(data: xr.Dataset) -> Panel:
@@ -112,9 +103,9 @@ def modules(data: xr.Dataset) -> Panel:
         name="modules",
         letter="D",
         title="Critical k₁ over the number of modules",
-        draw=lambda narrow: _draw_modules(data, narrow),
+        draw=_draw_modules(data),
         alt=f"Critical front spring for {counts[0]} to {counts[-1]} modules, between {number(np.nanmin(values))} and "
-        f"{spring(float(np.nanmax(values)), 3)}; open markers where the pitchfork is subcritical.",
+        f"{spring(np.nanmax(values), 3)}; open markers where the pitchfork is subcritical.",
         text=(
             f"The same critical spring for shorter and longer robots made of the same modules. {level}"
             + (f"For {spans(missing)} modules the straight walk is not lost through a pitchfork." if missing else ""),
@@ -128,9 +119,9 @@ def modules(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_modules(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes_by = style.figure(*_MODULES, narrow)
-    axes: Axes = axes_by["A"]
+@style.in_layouts(style.Layout("A", 3.6), style.Layout("A", 3.6))
+def _draw_modules(axes_by: style.Mosaic, data: xr.Dataset) -> None:
+    axes = axes_by["A"]
     counts, values, says = data.modules.values, data.critical_k1.values, data.says.values
     axes.plot(counts, values, color=style.GREY, lw=0.9, zorder=1)
     for word, marker, fill in (("supercritical", "o", style.BLUE), ("subcritical", "s", "white")):
@@ -141,7 +132,7 @@ def _draw_modules(data: xr.Dataset, narrow: bool) -> Figure:
     built = data.attrs["built"]
     for value in values[(counts == built) & ~np.isnan(values)]:
         line = {"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 6}
-        words, at = f"this robot: {number(float(value), 4)}", (built, float(value))
+        words, at = f"this robot: {number(value, 4)}", (built, float(value))
         style.note(axes, words, at, (0, -34), ha="center", va="top", arrowprops=line)
     missing = counts[np.isnan(values)]
     if missing.size:
@@ -150,42 +141,33 @@ def _draw_modules(data: xr.Dataset, narrow: bool) -> Figure:
     finish(axes, "y", xlabel="number of modules", ylabel=f"critical {k(1)} ({SPRING_UNIT})")
     axes.set(ylim=(0.0, 1.3 * np.nanmax(values)), xlim=(counts[0] - 0.6, counts[-1] + 0.6))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
-    axes.xaxis.set_major_locator(MaxNLocator(9 if narrow else 20, integer=True))
-    axes.legend(loc="upper right", ncols=1 if narrow else 3)
-    return figure
+    axes.xaxis.set_major_locator(MaxNLocator(9 if axes_by.narrow else 20, integer=True))
+    axes.legend(loc="upper right", ncols=1 if axes_by.narrow else 3)
 
 
 def mode(data: xr.Dataset) -> Panel:
     """Panel of the mode of the pitchfork, beside the paper's five numbers and as a bent body."""
     computed, paper = data.computed.values, data.printed.values
-    known = ~np.isnan(paper)
-    off = np.abs(computed - paper)[known]
-    if not known.any():
-        compared = f"The paper prints no mode for {len(computed) + 1} modules."
-    else:
-        beyond = [str(joint) for joint in data.joint.values[known][off > _ROUNDING]]
-        compared = (
-            f"The paper prints two decimals, so {_ROUNDING:g} either way is what rounding allows (the grey band). "
-        ) + (
-            f"Joint {listing(beyond)} of this robot lies outside, by {float(off.max() - _ROUNDING):.4f} at most."
-            if beyond
-            else f"All {len(off)} are inside."
-        )
+    known, off = not np.isnan(paper).any(), np.abs(computed - paper)
+    beyond = [str(joint) for joint in data.joint.values[off > _ROUNDING]]
+    inside = f"All {len(off)} are inside."
+    if beyond:
+        inside = f"Joint {listing(beyond)} of this robot lies outside, by {float(off.max() - _ROUNDING):.4f} at most."
+    compared = f"The paper prints two decimals, so {_ROUNDING:g} either way is what rounding allows (the grey band)."
+    prints = f"; the paper prints {', '.join(f'{value:.2f}' for value in paper)}" if known else ""
     same_sign = bool((np.sign(computed) == np.sign(computed[0])).all())
     return Panel(
         name="mode",
         letter="E",
         title="The mode: how the body bends",
-        draw=lambda narrow: _draw_mode(data, narrow),
-        alt="Joint components of the critical mode: "
-        + ", ".join(number(value, 4) for value in computed)
-        + ("; the paper prints " + ", ".join(f"{value:.2f}" for value in paper) if known.any() else "")
-        + ". Beside it the body bent that way, to the left and to the right.",
+        draw=_draw_mode(data),
+        alt=f"Joint components of the critical mode: {', '.join(number(value, 4) for value in computed)}{prints}. "
+        "Beside it the body bent that way, to the left and to the right.",
         text=(
             f"At the critical spring, k₁ = {spring(data.attrs['value'])}, one small bend of the body neither grows nor "
             f"dies out: the mode. Its {len(computed)} numbers are the shares of the joints from front to rear, scaled "
             "so that their squares add up to 1.",
-            compared,
+            f"{compared} {inside}" if known else f"The paper prints no mode for {len(computed) + 1} modules.",
             (
                 "All have one sign, so the body bends into one arc and the robot walks a curve; the same arc mirrored "
                 "is just as likely. "
@@ -199,10 +181,13 @@ def mode(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_mode(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_MODE, narrow)
+@style.in_layouts(
+    style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0)),
+    style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9)),
+)
+def _draw_mode(axes: style.Mosaic, data: xr.Dataset) -> None:
     computed, paper, joints = data.computed.values, data.printed.values, data.joint.values
-    known = not np.isnan(paper).all()
+    known = not np.isnan(paper).any()
     _bars(axes["A"], joints, computed, "computed")
     if known:
         axes["A"].plot(joints, paper, "_", color=style.BLACK, markersize=26, markeredgewidth=2, label="paper")
@@ -222,7 +207,6 @@ def _draw_mode(data: xr.Dataset, narrow: bool) -> Figure:
     axes["B"].set_xticks(joints)
     _bent_body(axes["C"], computed)
     axes["C"].set_title("The body bent that way")
-    return figure
 
 
 def _bars(axes: Axes, joints: np.ndarray, values: np.ndarray, label: str = "") -> None:
@@ -260,7 +244,7 @@ def uniform(data: xr.Dataset) -> Panel:
         name="uniform",
         letter="F",
         title="Uniform springs: the body undulates",
-        draw=lambda narrow: _draw_uniform(data, narrow),
+        draw=_draw_uniform(data),
         alt=f"Amplitudes and phases of the joints in the undulation, and {_SNAPSHOTS} body shapes over one cycle of "
         f"{number(period)} s: a wave that runs {runs}.",
         text=(
@@ -281,8 +265,8 @@ def uniform(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_uniform(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_UNIFORM, narrow)
+@style.in_layouts(style.Layout("AB;CC", 6.4, heights=(1.0, 1.25)), style.Layout("A;B;C", 9.6, heights=(0.8, 0.8, 1.9)))
+def _draw_uniform(axes: style.Mosaic, data: xr.Dataset) -> None:
     joints, degrees = data.joint.values, np.degrees(data.phase.values)
     _bars(axes["A"], joints, data.amplitude.values)
     axes["A"].margins(y=0.15)
@@ -295,9 +279,8 @@ def _draw_uniform(data: xr.Dataset, narrow: bool) -> Figure:
     finish(axes["B"], "y", ylabel="phase (degrees)", title="Phase relative to joint 1")
     for letter in "AB":
         axes[letter].set_xlabel("joint, from the front")
-    _snapshots(axes["C"], data, columns=1 if narrow else 2)
+    _snapshots(axes["C"], data, columns=1 if axes.narrow else 2)
     axes["C"].set_title("Body shapes over one cycle")
-    return figure
 
 
 def _snapshots(axes: Axes, data: xr.Dataset, columns: int) -> None:

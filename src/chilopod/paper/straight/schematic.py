@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
@@ -35,7 +34,7 @@ def panel(robot: Robot) -> Panel:
         name="schematic",
         letter="A",
         title="The model",
-        draw=lambda narrow: _draw(robot, data, narrow),
+        draw=_draw(robot, data),
         alt=f"Top view of {robot.body.modules} modules in a row joined by {robot.body.modules - 1} sprung yaw joints, "
         f"one module enlarged with its measures, and a diagram of when each foot stands.",
         text=(
@@ -61,30 +60,23 @@ def legs(robot: Robot) -> xr.Dataset:
     stands = gait.stands(phase)
     centre = -robot.module_length * (np.arange(n) + 0.5)
     ahead = np.where(stands, gait.stroke(phase), np.nan)
-    both = ("module", "side")
-    return xr.Dataset(
-        {
-            "phase": (both, phase, {"units": "1", "about": "at t = 0, in cycles; 0 is touch-down"}),
-            "stands": (both, stands, {"about": "at t = 0"}),
-            "touch_down": (both, (-phase % 1.0) * gait.period, {"units": "s"}),
-            "foot_x": (
-                both,
-                centre[:, None] + robot.legs.forward_offset + ahead,
-                {"units": "m", "about": "at t = 0, from the front end, NaN in the air"},
-            ),
-            "centre_x": (("module",), centre, {"units": "m", "about": "from the front end"}),
-        },
-        coords={"module": np.arange(1, n + 1), "side": np.array(_SIDES, dtype=object)},
-        attrs={"robot": robot.name, "period_s": gait.period, "stance_s": gait.stance},
-    )
+    foot, both = centre[:, None] + robot.legs.forward_offset + ahead, ("module", "side")
+    columns = {
+        "phase": (both, phase, {"units": "1", "about": "at t = 0, in cycles; 0 is touch-down"}),
+        "stands": (both, stands, {"about": "at t = 0"}),
+        "touch_down": (both, (-phase % 1.0) * gait.period, {"units": "s"}),
+        "foot_x": (both, foot, {"units": "m", "about": "at t = 0, from the front end, NaN in the air"}),
+        "centre_x": (("module",), centre, {"units": "m", "about": "from the front end"}),
+    }
+    coords = {"module": np.arange(1, n + 1), "side": np.array(_SIDES, dtype=object)}
+    return xr.Dataset(columns, coords, {"robot": robot.name, "period_s": gait.period, "stance_s": gait.stance})
 
 
-def _draw(robot: Robot, data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(_WIDE, _NARROW, narrow)
-    _whole(axes["A"], robot, data, narrow)
+@style.in_layouts(_WIDE, _NARROW)
+def _draw(axes: style.Mosaic, robot: Robot, data: xr.Dataset) -> None:
+    _whole(axes["A"], robot, data, axes.narrow)
     _one_module(axes["B"], robot)
     _gait(axes["C"], robot, data)
-    return figure
 
 
 def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:

@@ -23,16 +23,11 @@ def mode_rows(data: xr.Dataset) -> list[Row]:
     """The pitchfork and its mode."""
     found, said = data.attrs, printed.CRITICAL_K1
     kind = f"{found['kind']}, {found['criticality']} (coefficient {found['coefficient']:.4g} /rad² per cycle)"
+    crossing, same = f"{printed.KIND} (from the exponent crossing on the real axis)", found["kind"] == printed.KIND
+    remark = "the paper's linear analysis does not give a direction"
     rows = [
         Row("critical k1", str(said), _located(data), ANALYSIS, agreement(said.band.holds(found["value"]))),
-        Row(
-            "kind and direction",
-            f"{printed.KIND} (from the exponent crossing on the real axis)",
-            Result(kind),
-            ANALYSIS,
-            agreement(found["kind"] == printed.KIND),
-            "the paper's linear analysis does not give a direction",
-        ),
+        Row("kind and direction", crossing, Result(kind), ANALYSIS, agreement(same), remark),
     ]
     known = printed.MODE if len(data.computed) == len(printed.MODE) else ()
     for joint, (computed, paper) in enumerate(zip(data.computed.values, known, strict=False), 1):
@@ -59,30 +54,21 @@ def module_rows(data: xr.Dataset) -> list[Row]:
     """Longer robots."""
     longer = data.sel(modules=data.modules > 6).critical_k1
     base, said = float(data.sel(modules=6).critical_k1), printed.LITTLE_CHANGE
-    return [
-        Row(
-            f"critical k1 for 7 to {int(data.modules[-1])} modules of the same size",
-            said.words,
-            Result(f"{float(longer.min()):.2f} to {float(longer.max()):.2f} {PAPER_UNIT}"),
-            f"{ANALYSIS}, figure D",
-            agreement(all(said.holds(float(value) / base) for value in longer)),
-        )
-    ]
+    quantity = f"critical k1 for 7 to {int(data.modules[-1])} modules of the same size"
+    result = Result(f"{float(longer.min()):.2f} to {float(longer.max()):.2f} {PAPER_UNIT}")
+    verdict = agreement(all(said.holds(float(value) / base) for value in longer))
+    return [Row(quantity, said.words, result, f"{ANALYSIS}, figure D", verdict)]
 
 
 def uniform_rows(data: xr.Dataset) -> list[Row | OfPlanar]:
     """All springs alike."""
     found = data.attrs
     cycle = f"{found['frequency_rad_s']:.4f} rad/s: a cycle of {found['oscillation_period_s']:.1f} s"
+    kind = Result(f"{found['kind']}, {found['criticality']}, {cycle}")
+    said, verdict = f'{printed.UNIFORM_KIND} ("Hopf")', agreement(found["kind"] == printed.UNIFORM_KIND)
     return [
         unprinted("uniform springs: critical k", _located(data), printed.COMPARISON),
-        Row(
-            "uniform springs: kind",
-            f'{printed.UNIFORM_KIND} ("Hopf")',
-            Result(f"{found['kind']}, {found['criticality']}, {cycle}"),
-            ANALYSIS,
-            agreement(found["kind"] == printed.UNIFORM_KIND),
-        ),
+        Row("uniform springs: kind", said, kind, ANALYSIS, verdict),
         OfPlanar(statements.UNIFORM, Result(value=found["value"], unit=PAPER_UNIT)),
     ]
 
@@ -91,16 +77,14 @@ def identification_rows(found: Identification) -> list[Row]:
     """The constants the paper does not print."""
     legs, allowed = found.best.legs, found.allowed("legs.forward_offset")
     span = "nowhere" if allowed is None else f"{1e3 * allowed[0]:.0f} to {1e3 * allowed[1]:.0f} mm"
-    return [
-        unprinted(
-            "foot friction, half-width, forward offset",
-            f"{found.best.ground.friction:.1f} N*s/m, {1e3 * legs.half_width:.1f} mm, "
-            f"{1e3 * legs.forward_offset:.1f} mm",
-            ANALYSIS,
-            f"best fit, largest residual {np.abs(found.residuals).max():.2f} of rounding "
-            f"(this robot: {np.abs(found.preset_residuals).max():.2f}); rounding allows forward offsets of {span}",
-        )
-    ]
+    friction, width, offset = found.best.ground.friction, 1e3 * legs.half_width, 1e3 * legs.forward_offset
+    largest, ours = (np.abs(each).max() for each in (found.residuals, found.preset_residuals))
+    remark = (
+        f"best fit, largest residual {largest:.2f} of rounding (this robot: {ours:.2f}); rounding allows forward "
+        f"offsets of {span}"
+    )
+    words = f"{friction:.1f} N*s/m, {width:.1f} mm, {offset:.1f} mm"
+    return [unprinted("foot friction, half-width, forward offset", words, ANALYSIS, remark)]
 
 
 def _located(data: xr.Dataset) -> Result:

@@ -31,8 +31,6 @@ from chilopod.tasks.identify import Identification, identify_planar
 def exponent_sweep(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Floquet exponents as k1 falls (panel B), each followed through the sweep as one curve.
 
-    Returns
-    -------
     Dataset over (k1, exponent): ``real``, ``imaginary`` (1/s), and ``follows_critical``, True for the curve that
     crosses zero.
     """
@@ -47,15 +45,13 @@ def exponent_sweep(context: Context, progress: Progress = silent) -> xr.Dataset:
     # The curve that is in the left half-plane for stiff springs and in the right one for soft springs, on the real
     # axis.
     critical = (table.real[0] < 0.0) & (table.real[-1] > 0.0)
-    return xr.Dataset(
-        {
-            "real": (("k1", "exponent"), table.real, {"units": "1/s"}),
-            "imaginary": (("k1", "exponent"), table.imag, {"units": "1/s"}),
-            "follows_critical": (("exponent",), critical),
-        },
-        coords={"k1": ("k1", ks, {"units": PAPER_UNIT})},
-        attrs={"robot": robot.name, "about": "Floquet exponents of the straight walk, each followed as one curve"},
-    )
+    columns = {
+        "real": (("k1", "exponent"), table.real, {"units": "1/s"}),
+        "imaginary": (("k1", "exponent"), table.imag, {"units": "1/s"}),
+        "follows_critical": (("exponent",), critical),
+    }
+    attrs = {"robot": robot.name, "about": "Floquet exponents of the straight walk, each followed as one curve"}
+    return xr.Dataset(columns, {"k1": ("k1", ks, {"units": PAPER_UNIT})}, attrs)
 
 
 def _followed(
@@ -76,8 +72,6 @@ def _followed(
 def critical_mode(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The pitchfork in k1 and its mode beside the paper's five numbers.
 
-    Returns
-    -------
     Dataset over joint: ``computed``, ``printed`` (NaN for another number of modules); the point itself in the
     attributes.
     """
@@ -92,8 +86,6 @@ def critical_mode(context: Context, progress: Progress = silent) -> xr.Dataset:
 def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Critical k1 for the paper's variants (panel C) beside the paper's statements on the robot.
 
-    Returns
-    -------
     Dataset over variant: ``critical_k1``, ``error_bound``, ``robot_printed`` (N*mm/deg).
     """
     robots = printed.variant_robots(context.robot)
@@ -102,19 +94,14 @@ def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
         progress(index / len(robots), name)
         point = pitchfork(each)
         found.append((point.value, point.error_bound, printed.onset(name).value))
-    names, columns = ("critical_k1", "error_bound", "robot_printed"), np.array(found).T
-    return xr.Dataset(
-        {name: ("variant", each, {"units": PAPER_UNIT}) for name, each in zip(names, columns, strict=True)},
-        coords={"variant": np.array(list(robots), dtype=object)},
-        attrs={"robot": context.robot.name},
-    )
+    named = zip(("critical_k1", "error_bound", "robot_printed"), np.array(found).T, strict=True)
+    columns = {name: ("variant", each, {"units": PAPER_UNIT}) for name, each in named}
+    return xr.Dataset(columns, {"variant": np.array(list(robots), dtype=object)}, {"robot": context.robot.name})
 
 
 def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Critical k1 over the number of modules (panel D).
 
-    Returns
-    -------
     Dataset over modules: ``critical_k1``, ``error_bound`` (N*mm/deg; NaN where the straight walk does not lose
     stability through a pitchfork), ``says``; attribute ``built``, the number of the robot as built.
     """
@@ -129,22 +116,18 @@ def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
             found.append((np.nan, np.nan, error.problem))
         progress((index + 1) / len(counts), f"{count} modules")
     values, bounds, says = zip(*found, strict=True)
-    return xr.Dataset(
-        {
-            "critical_k1": ("modules", np.array(values), {"units": PAPER_UNIT}),
-            "error_bound": ("modules", np.array(bounds), {"units": PAPER_UNIT}),
-            "says": ("modules", np.array(says, dtype=object)),
-        },
-        coords={"modules": np.array(list(counts))},
-        attrs={"robot": context.robot.name, "built": context.robot.body.modules},
-    )
+    columns = {
+        "critical_k1": ("modules", np.array(values), {"units": PAPER_UNIT}),
+        "error_bound": ("modules", np.array(bounds), {"units": PAPER_UNIT}),
+        "says": ("modules", np.array(says, dtype=object)),
+    }
+    attrs = {"robot": context.robot.name, "built": context.robot.body.modules}
+    return xr.Dataset(columns, {"modules": np.array(list(counts))}, attrs)
 
 
 def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The bifurcation for uniform springs (the paper's "Hopf"): amplitudes and phases of the undulation along the body.
 
-    Returns
-    -------
     Dataset over joint: ``amplitude`` (unit norm), ``phase`` (rad, relative to joint 1, positive leads); the point in
     the attributes.
     """
@@ -153,11 +136,9 @@ def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset
     components = point.joint_components
     phase = np.unwrap(np.angle(components))
     columns = {"amplitude": ("joint", np.abs(components)), "phase": ("joint", phase - phase[0], {"units": "rad"})}
-    return _over_joints(columns, robot, point).assign_attrs(
-        frequency_rad_s=point.point.frequency,
-        oscillation_period_s=2.0 * np.pi / point.point.frequency,
-        gait_period_s=robot.gait.period,
-    )
+    rate = point.point.frequency
+    times = {"oscillation_period_s": 2.0 * np.pi / rate, "gait_period_s": robot.gait.period}
+    return _over_joints(columns, robot, point).assign_attrs(frequency_rad_s=rate, **times)
 
 
 def identified(context: Context, progress: Progress = silent) -> Identification:

@@ -14,18 +14,11 @@ from matplotlib.patches import Arc, Circle
 from chilopod.frozen import Array
 from chilopod.paper import printed
 from chilopod.paper.printed import CRITERION_NAMES
-from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, legend_below, over_compliance
+from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, over_compliance
 from chilopod.paper.statements import listed
+from chilopod.paper.turning import trials
 from chilopod.paper.turning.study import SCALES, Turning, all_lower, in_words, minima, saturation, softest_minima
-from chilopod.paper.turning.trials import (
-    LegYaw,
-    TurningTask,
-    arrivals,
-    by_leg_yaw,
-    outcome_words,
-    span,
-    springs_by_outcome,
-)
+from chilopod.paper.turning.trials import LegYaw, TurningTask, arrivals, by_leg_yaw, outcome_words, springs_by_outcome
 from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel
@@ -33,11 +26,8 @@ from chilopod.show.scene.outline import draw_modules
 from chilopod.show.words import SPRING_UNIT, k, listing, number, spring, typeset
 from chilopod.steering import ARRIVAL_RADIUS, Outcome
 
-_TURNING = (style.Layout("AB;CD", 7.6, heights=(1.5, 1.0)), style.Layout("A;B;C;D", 12.6, heights=(1.0, 1.3, 0.9, 0.9)))
-_CRITERIA = (style.Layout("ABC", 3.9), style.Layout("A;B;C", 9.9))
 _WITHOUT = (style.Layout("AB", 4.0), style.Layout("A;B", 7.4))
 _WITHOUT_ONE = (style.Layout("A", 4.4), style.Layout("A", 4.2))
-_WHY = (style.Layout("AB", 4.0), style.Layout("A;B", 7.8))
 _SHOWN = (style.ORANGE, style.GREEN, style.BLUE)
 _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 _CURVES = tuple(zip(style.CURVES, _DASHES, strict=False))
@@ -49,8 +39,7 @@ _TOP, _TOP_HOPF = (41, 15, 10, 7, 5), (41, 10, 5, 3, 2)  # N*mm/deg, on the uppe
 
 def panels(found: Turning) -> list[Panel]:
     """All figures, in the paper's order."""
-    both = (criteria(found, letter) for letter in "AB")
-    return [turning(found), *both, without(found), comparison(found), why(found)]
+    return [turning(found), *(criteria(found, each) for each in "AB"), without(found), comparison(found), why(found)]
 
 
 def turning(found: Turning) -> Panel:
@@ -62,7 +51,7 @@ def turning(found: Turning) -> Panel:
     return Panel(
         name="turning",
         title="Turning task A: a target ahead to the left",
-        draw=lambda narrow: draw_turning(found.robot, task, narrow),
+        draw=draw_turning(found.robot, task),
         alt=f"A circle from the robot to a target {away:g} m away at {psi:g} degrees; walks with three springs, "
         f"of which that with {number(best)} {SPRING_UNIT} comes nearest; distance and angle of the target over "
         "time.",
@@ -89,9 +78,11 @@ def usual_outcomes(task: TurningTask) -> str:
     return listing(f"most {what.label} with {spring(k, 2)}" for k in shown for what, those in by_outcome if k in those)
 
 
-def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
+@style.in_layouts(
+    style.Layout("AB;CD", 7.6, heights=(1.5, 1.0)), style.Layout("A;B;C;D", 12.6, heights=(1.0, 1.3, 0.9, 0.9))
+)
+def draw_turning(axes: style.Mosaic, robot: Robot, task: TurningTask) -> None:
     """Circle, paths, distance and angle of a task, as in the paper's Fig. "turning" A to D."""
-    figure, axes = style.figure(*_TURNING, narrow)
     _geometry(axes["A"], robot, *task.target.position)
     data, arrival = task.paths, task.criteria.arrival.sel(spring=task.paths.shown).values
     for row, (spring_, color) in enumerate(zip(data.shown.values, _SHOWN, strict=True)):
@@ -105,7 +96,7 @@ def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
     _floor(axes["B"], data)
     axes["B"].set_title("B  Path of module 1")
     look: dict[str, Any] = {"title": f"springs in {SPRING_UNIT}", "title_fontsize": style.SMALL}
-    figure.legend(*axes["B"].get_legend_handles_labels(), loc="outside lower center", ncols=3, **look)
+    axes.legend_below("B", 3, 3, **look)
     axes["C"].axhline(ARRIVAL_RADIUS, color=style.BLACK, lw=0.9, linestyle=DASHED)
     style.note(axes["C"], f"arrived, {ARRIVAL_RADIUS:g} m", (0.4, ARRIVAL_RADIUS), (0, 3), va="bottom")
     axes["C"].set(ylim=(0.0, 1.45), ylabel="target distance (m)", title="C  Distance of the target")
@@ -117,7 +108,6 @@ def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
         finish(axes[letter], xlim=(0.0, float(data.time[-1])), xlabel="time (s)")
     said = f"earliest arrival, {number(task.time)} s"
     style.note(axes["D"], said, (task.time, -250.0), (-4, 0), ha="right", va="center")
-    return figure
 
 
 def _run(axes: Axes, time: Array, x: Array, y: Array, until: float, color: str) -> None:
@@ -130,8 +120,7 @@ def _run(axes: Axes, time: Array, x: Array, y: Array, until: float, color: str) 
 
 def _target(axes: Axes, x: float, y: float) -> None:
     """Target, and circle within which it counts as reached."""
-    circle = Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=style.BLACK, lw=1.0, linestyle=DASHED, zorder=5)
-    axes.add_patch(circle)
+    axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=style.BLACK, lw=1.0, linestyle=DASHED, zorder=5))
     axes.plot(x, y, "+", color=style.BLACK, markersize=9, markeredgewidth=1.6, zorder=6)
 
 
@@ -175,20 +164,19 @@ def criteria(found: Turning, letter: str) -> Panel:
     smallest = minima(task.criteria)["at"].sel(criterion=list(CRITERION_NAMES)).values
     psi, away, law = np.rad2deg(task.target.bearing), task.target.distance, found.laws.k_hat(task.target.radius)[0]
     shown = {walks_of(task): task}
+    other = f"Task {letter} ({psi:g}°, {away:g} m): the criteria again"
     return Panel(
         name="turning-criteria" if first else "turning-another",
-        title="Task A: the paper's three criteria over the spring"
-        if first
-        else f"Task {letter} ({psi:g}°, {away:g} m): the criteria again",
-        draw=lambda narrow: draw_criteria(shown, narrow, _TOP, k_hat=law),
+        title="Task A: the paper's three criteria over the spring" if first else other,
+        draw=draw_criteria(shown, _TOP, k_hat=law),
         alt="Distance, angle and leg yaw over the compliance of the first spring, smallest at "
-        f"{listing(number(float(each), 2) for each in smallest)} {SPRING_UNIT}.",
+        f"{listing(number(each, 2) for each in smallest)} {SPRING_UNIT}.",
         text=(
             _said(found, letter),
             f"ε3 has no clear minimum within this task: from {flat.softest:g} to {flat.stiffest:g}\u00a0{SPRING_UNIT} "
             "no difference is told, because the legs stand at their limit of 5° until the target "
             "is passed, to whichever side. Integrated until each robot arrives, when its task is done, it is smallest "
-            f"at {spring(float(whole['at']), 2)}. A farther target shows a minimum (last figure)."
+            f"at {spring(whole['at'], 2)}. A farther target shows a minimum (last figure)."
             if first
             else "",
         ),
@@ -203,7 +191,7 @@ def comparison(found: Turning) -> Panel:
     return Panel(
         name="turning-hopf",
         title="Pitchfork against Hopf",
-        draw=lambda narrow: draw_comparison(task, found.hopf, narrow, _TOP_HOPF),
+        draw=draw_comparison(task, found.hopf, _TOP_HOPF),
         alt="The three criteria over the spring for the two strategies; the pitchfork's smallest values lie below.",
         text=(
             "The earlier strategy softens all springs together, so that the straight walk gives way to an undulation "
@@ -240,10 +228,10 @@ def _said(found: Turning, letter: str) -> str:
     return (
         f"Means and standard errors of {task.criteria.sizes['repeat']} walks, at {number(task.time)}\u00a0s. Robots "
         f"arrive with {min(arrived):g} to {max(arrived):g}\u00a0{SPRING_UNIT} (shaded); most have "
-        f"{outcome_words(task.criteria, span)}. The minima (parabola through the lowest mean and its neighbours): "
-        f"{places(task)}\u00a0{SPRING_UNIT}. The dashed line is the spring of the radius law, {spring(k_hat)}; "
-        f"for the robot the paper's is {printed.TASKS[letter].k_hat.value:g}, with all three minima around it. In the "
-        f"model they lie at {listing(number(part, 2) for part in parts)} of the law's spring."
+        f"{outcome_words(task.criteria, trials.span)}. The minima (parabola through the lowest mean and its "
+        f"neighbours): {places(task)}\u00a0{SPRING_UNIT}. The dashed line is the spring of the radius law, "
+        f"{spring(k_hat)}; for the robot the paper's is {printed.TASKS[letter].k_hat.value:g}, with all three minima "
+        f"around it. In the model they lie at {listing(number(part, 2) for part in parts)} of the law's spring."
         + (f" {_SLOW}" if min(parts) < 1.0 else "")
         + " The axis of ε3 does not start at zero."
     )
@@ -253,8 +241,7 @@ def places(task: TurningTask) -> str:
     """Springs at the minima of the criteria."""
     at = minima(task.criteria)["at"]
     return listing(
-        f"{title.partition(',')[0]} at {number(float(at.sel(criterion=name)), 3)}"
-        for name, title in CRITERION_NAMES.items()
+        f"{title.partition(',')[0]} at {number(at.sel(criterion=name), 3)}" for name, title in CRITERION_NAMES.items()
     )
 
 
@@ -263,21 +250,25 @@ def walks_of(task: TurningTask) -> str:
     return f"mean of {task.criteria.sizes['repeat']} walks ± standard error"
 
 
-def draw_comparison(task: TurningTask, hopf: TurningTask, narrow: bool, top: Sequence[float]) -> Figure:
+def draw_comparison(task: TurningTask, hopf: TurningTask, top: Sequence[float]) -> style.Drawing:
     """The three criteria over 1/k of the two strategies, with springs to mark on the top axis."""
     shown = {"pitchfork: first spring alone": task, "Hopf: all springs alike": hopf}
-    return draw_criteria(shown, narrow, top, "k")
+    return draw_criteria(shown, top, "k")
 
 
+@style.in_layouts(style.Layout("ABC", 3.9), style.Layout("A;B;C", 9.9))
 def draw_criteria(
-    shown: Mapping[str, TurningTask], narrow: bool, top: Sequence[float], name: str = k(1), k_hat: float | None = None
-) -> Figure:
+    axes: style.Mosaic,
+    shown: Mapping[str, TurningTask],
+    top: Sequence[float],
+    name: str = k(1),
+    k_hat: float | None = None,
+) -> None:
     """The three criteria over 1/k of one or two tasks by their names, with some springs (N*mm/deg) on the top axis.
 
     With the spring of a radius law, ``k_hat`` (N*mm/deg), the springs that arrive are shaded; without it the lowest
     mean of the first task is marked.
     """
-    figure, axes = style.figure(*_CRITERIA, narrow)
     first = next(iter(shown.values()))
     arrived = springs_by_outcome(first.criteria)[Outcome.ARRIVED]
     for place, criterion in zip("ABC", CRITERION_NAMES, strict=True):
@@ -302,23 +293,15 @@ def draw_criteria(
         low, high = one.dataLim.y0, one.dataLim.y1
         one.set_ylim(*((0.95 * low, 1.02 * high) if criterion == "effort" else (0.0, None)))
         over_compliance(one, top, name)
-    legend_below(figure, axes["A"], 1 if narrow else 3)
-    return figure
+    axes.legend_below("A", 3)
 
 
 def without(found: Turning) -> Panel:
     """Fig. "without": trajectories with and without leg yaw."""
     data, cases = found.without, by_leg_yaw(found.without)
-    said = []
-    for case in cases:
-        arrived, trials = arrivals(case.alone)
-        said.append(f"with {spring(case.spring, 3)} {arrived} of {trials} arrive, {sides(case)}")
+    said = [f"with {spring(case.spring, 3)} {trials.counted(case.alone)} arrive, {sides(case)}" for case in cases]
+    helped = [f"{trials.counted(case.helped)} arrive with {spring(case.spring, 3)}" for case in cases]
     largest = float(np.rad2deg(max(np.abs(case.alone.turned).max() for case in cases)))
-    helped = [
-        f"{arrived} of {trials} arrive with {spring(case.spring, 3)}"
-        for case in cases
-        for arrived, trials in (arrivals(case.helped),)
-    ]
     return Panel(
         name="turning-without",
         title="With and without leg yaw",
@@ -327,13 +310,11 @@ def without(found: Turning) -> Panel:
         "leg yaw they turn to the target.",
         text=(
             f"Without the help of the legs the side is left to chance and the bend grows slowly: {listing(said)}; no "
-            f"heading has changed by more than {number(largest, 2)}° after {number(float(data.time[-1]), 2)}\u00a0s. "
+            f"heading has changed by more than {number(largest, 2)}° after {number(data.time[-1], 2)}\u00a0s. "
             "The paper found the same with its robot: many of nine walks failed, because the bend took long to come or "
             "went the wrong way, and all five with leg yaw arrived.",
-            "With leg yaw "
-            + listing(helped)
-            + ". The first is the spring that comes nearest to the target, the second that of the radius law, so close "
-            "to the pitchfork that its bend hardly grows within the task.",
+            f"With leg yaw {listing(helped)}. The first is the spring that comes nearest to the target, the second "
+            "that of the radius law, so close to the pitchfork that its bend hardly grows within the task.",
         ),
         data=data,
     )
@@ -348,15 +329,15 @@ def sides(case: LegYaw) -> str:
 def draw_without(data: xr.Dataset, narrow: bool) -> Figure:
     """Paths with and without leg yaw, a panel for each spring."""
     cases = by_leg_yaw(data)
-    figure, axes = style.figure(*(_WITHOUT if len(cases) > 1 else _WITHOUT_ONE), narrow)
+    axes = style.Mosaic(*(_WITHOUT if len(cases) > 1 else _WITHOUT_ONE), narrow)
     for case, letter in zip(cases, "AB", strict=False):
         for walks, color, name in ((case.alone, style.ORANGE, "without"), (case.helped, style.GREEN, "with")):
             first, *_ = axes[letter].plot(walks.x.values.T, walks.y.values.T, color=color, lw=1.1)
             first.set_label(f"{name} leg yaw, {arrivals(walks)[1]} walks")
         _floor(axes[letter], data)
         axes[letter].set_title(f"{letter}  {case.name.capitalize()}, {number(case.spring, 3)} {SPRING_UNIT}")
-    legend_below(figure, axes["A"], 1 if narrow else 2)
-    return figure
+    axes.legend_below("A", 2)
+    return axes.figure
 
 
 def why(found: Turning) -> Panel:
@@ -365,21 +346,21 @@ def why(found: Turning) -> Panel:
     best = [float(farther.spring[int(row.argmin())]) for row in farther.effort.values]
     cm = 100.0 * settled.start_nearest
     apart = listing(
-        f"{number(float(cm.sel(task=task, start='bent')), 2)} and "
-        f"{number(float(cm.sel(task=task, start='bent, aimed')), 2)}\u00a0cm in task {task}"
+        f"{number(cm.sel(task=task, start='bent'), 2)} and "
+        f"{number(cm.sel(task=task, start='bent, aimed'), 2)}\u00a0cm in task {task}"
         for task in settled.task.values
     )
     return Panel(
         name="turning-why",
         title="Why the best spring is not that of the radius law",
-        draw=lambda narrow: _draw_why(settled, farther, narrow),
+        draw=_draw_why(settled, farther),
         alt="How near the target comes at the spring of the law, starting straight and bent; and the leg yaw needed "
         "for targets at several distances over the spring.",
         text=(
             "The law is not wrong: it speaks of the settled curve. Undisturbed, without leg yaw and at the law's own "
             "spring, a robot that starts straight goes straight on. One that starts bent passes close by the target, "
             "and closer still once it is taken into account that on its curve module 1 does not move where it points, "
-            f"but {listing(f'{number(float(angle), 2)}°' for angle in abs(np.rad2deg(settled.slip)))} to the outside "
+            f"but {listing(f'{number(angle, 2)}°' for angle in abs(np.rad2deg(settled.slip)))} to the outside "
             f"in tasks {listing(str(task) for task in settled.task.values)}: {apart}. What the "
             "law leaves out is the time that the bend needs to grow, which next to the pitchfork is longer than the "
             "task. A softer spring bends faster and makes up for the delay.",
@@ -399,8 +380,8 @@ def why(found: Turning) -> Panel:
     )
 
 
-def _draw_why(settled: xr.Dataset, farther: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_WHY, narrow)
+@style.in_layouts(style.Layout("AB", 4.0), style.Layout("A;B", 7.8))
+def _draw_why(axes: style.Mosaic, settled: xr.Dataset, farther: xr.Dataset) -> None:
     rows = np.arange(settled.sizes["start"])
     for task, color, shift in zip(settled.task.values, (style.BLUE, style.ORANGE), (-0.17, 0.17), strict=False):
         values = settled.start_nearest.sel(task=task).values
@@ -410,12 +391,10 @@ def _draw_why(settled: xr.Dataset, farther: xr.Dataset, narrow: bool) -> Figure:
     axes["A"].set_yticks(rows, [str(start).replace(", ", ",\n") for start in settled.start.values])
     axes["A"].set(ylim=(rows[-1] + 0.55, -0.55), xlim=(0.0, 1.2 * float(settled.start_nearest.max())))
     axes["A"].axvline(ARRIVAL_RADIUS, color=style.BLACK, lw=0.9, linestyle=DASHED)
-    title = "A  Start, no leg yaw"
-    finish(axes["A"], "x", "lower right", xlabel="nearest distance of the target (m)", title=title)
+    finish(axes["A"], "x", "lower right", xlabel="nearest distance of the target (m)", title="A  Start, no leg yaw")
     for row, (color, dash) in zip(farther.effort_part.values, _CURVES, strict=False):
         look: dict[str, Any] = {"color": color, "linestyle": dash, "marker": "o", "markersize": 4}
         axes["B"].plot(1.0 / farther.spring.values, 100.0 * row, **look)
     title, label = "B  Leg yaw needed, farther targets", "ε3 / legs always at 5° (%)"
     finish(axes["B"], ylim=(0.0, 135.0), xlabel="1/k₁ (deg/(N·mm))", ylabel=label, title=title)
     axes["B"].legend([f"R = {away:g} m" for away in farther.away.values], loc="upper center", ncols=2)
-    return figure

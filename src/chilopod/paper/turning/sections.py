@@ -40,14 +40,9 @@ def rows(found: Turning) -> list[Row | OfPlanar]:
 
 def _radius(found: Turning, letter: str) -> Row:
     task, radius = printed.TASKS[letter], found.tasks[letter].target.radius
-    return Row(
-        f"task {letter} ({task.target}): radius of the circle to the target",
-        str(task.radius),
-        Result(value=radius, unit="m", digits=3),
-        task.source,
-        agreement(task.radius.band.holds(radius)),
-        "geometry alone, R/(2 sin ψ)",
-    )
+    quantity = f"task {letter} ({task.target}): radius of the circle to the target"
+    result, verdict = Result(value=radius, unit="m", digits=3), agreement(task.radius.band.holds(radius))
+    return Row(quantity, str(task.radius), result, task.source, verdict, "geometry alone, R/(2 sin ψ)")
 
 
 def _beside_robot(found: Turning, letter: str) -> list[OfPlanar]:
@@ -71,12 +66,9 @@ def _rough(found: Turning) -> Row:
         f"{title.partition(',')[0]} {float(usual.sel(criterion=name)):.1f} → {float(rough.sel(criterion=name)):.1f}"
         for name, title in CRITERION_NAMES.items()
     ]
-    return unprinted(
-        f"task A, disturbances {ROUGH:g} times as large: springs of the smallest criteria",
-        f"{', '.join(pairs)} {PAPER_UNIT}",
-        printed.TURNING,
-        f"evaluated at {found.rough.time:.2f} s, the earliest arrival there",
-    )
+    quantity = f"task A, disturbances {ROUGH:g} times as large: springs of the smallest criteria"
+    remark = f"evaluated at {found.rough.time:.2f} s, the earliest arrival there"
+    return unprinted(quantity, f"{', '.join(pairs)} {PAPER_UNIT}", printed.TURNING, remark)
 
 
 TURNING: Section[Turning] = Section("turning", CHAPTER, "turning to targets", turning, rows, panels)

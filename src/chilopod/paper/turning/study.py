@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -73,25 +72,24 @@ class Turning:
 def turning(context: Context, progress: Progress = silent) -> Turning:
     """All turning studies of the robot of the planar model; if not full, fewer springs and fewer, nearer targets."""
     robot, folder, quick = context.robot, context.folder, context.size is not Size.FULL
-    springs = QUICK_SPRINGS if quick else SPRINGS
+    usual = SPRINGS, UNIFORM_SPRINGS, ROUGH_SPRINGS, FARTHER
+    springs, uniform, rougher, distances = (
+        (QUICK_SPRINGS, UNIFORM_SPRINGS[::3], QUICK_SPRINGS, FARTHER[:2]) if quick else usual
+    )
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}
     for index, (letter, said) in enumerate(printed.TASKS.items()):
         share = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
         tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=share)
     task = tasks["A"]
-    same: dict[str, Any] = {"folder": folder, "progress": part(progress, 0.5, 0.65, "uniform springs")}
-    uniform = UNIFORM_SPRINGS[::3] if quick else UNIFORM_SPRINGS
-    hopf = turning_task(robot, task.target, uniform, strategy="hopf", time=task.time, **same)
-    same["progress"] = part(progress, 0.65, 0.85, "larger disturbances")
-    rougher = Disturbance().scaled(ROUGH)
-    rough_springs = QUICK_SPRINGS if quick else ROUGH_SPRINGS
-    rough = turning_task(robot, task.target, rough_springs, disturbance=rougher, **same)
+    share = part(progress, 0.5, 0.65, "uniform springs")
+    hopf = turning_task(robot, task.target, uniform, strategy="hopf", time=task.time, folder=folder, progress=share)
+    share, disturbance = part(progress, 0.65, 0.85, "larger disturbances"), Disturbance().scaled(ROUGH)
+    rough = turning_task(robot, task.target, rougher, disturbance=disturbance, folder=folder, progress=share)
     springs_ = {"best spring": task.best, "spring of the law": laws.k_hat(task.target.radius)[0]}
     share = part(progress, 0.85, 0.9, "with and without leg yaw")
     without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=share)
     settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
-    distances = FARTHER[:2] if quick else FARTHER
     farther = farther_targets(robot, laws, task.target.bearing, distances, folder)
     progress(1.0, "turning tasks")
     point = first_loss(robot, ALL, None, Kind.NEIMARK_SACKER, normal_form=False)
@@ -105,8 +103,6 @@ def settled_start(robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target],
     "bent", the settled walk; and "bent, aimed", with the target relative to the motion of module 1 instead of its
     heading.
 
-    Returns
-    -------
     Dataset over (task, start): ``start_nearest`` (m); over task: ``law_spring`` (N*mm/deg) and ``slip``, the mean
     angle from heading to motion of module 1 on the settled walk (rad).
     """
@@ -121,16 +117,14 @@ def settled_start(robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target],
         aimed = Target(target.bearing + slip, target.distance)
         records += trials.run([replace(bent, target=aimed)], folder)
         found.append((*(float(record.distance.min()) for record in records), spring, slip))
-    columns = np.array(found)
-    return xr.Dataset(
-        {
-            "start_nearest": (("task", "start"), columns[:, :3], {"units": "m"}),
-            "law_spring": ("task", columns[:, 3], {"units": PAPER_UNIT}),
-            "slip": ("task", columns[:, 4], {"units": "rad"}),
-        },
-        coords={"task": list(targets), "start": ["straight", "bent", "bent, aimed"]},
-        attrs={"robot": robot.name},
-    )
+    *nearest, springs, slips = np.array(found).T
+    columns = {
+        "start_nearest": (("task", "start"), np.array(nearest).T, {"units": "m"}),
+        "law_spring": ("task", springs, {"units": PAPER_UNIT}),
+        "slip": ("task", slips, {"units": "rad"}),
+    }
+    coords = {"task": list(targets), "start": ["straight", "bent", "bent, aimed"]}
+    return xr.Dataset(columns, coords, {"robot": robot.name})
 
 
 def _slip(record: xr.Dataset) -> float:
@@ -141,18 +135,12 @@ def _slip(record: xr.Dataset) -> float:
 
 
 def farther_targets(
-    robot: Robot,
-    laws: RadiusLaws,
-    bearing: float,
-    distances: Sequence[float],
-    folder: Folder,
+    robot: Robot, laws: RadiusLaws, bearing: float, distances: Sequence[float], folder: Folder
 ) -> xr.Dataset:
     """Results for targets in one direction at growing distances, with the effect of the time that a bend needs to grow.
 
     One undisturbed trial each, with leg yaw, with a duration in proportion to the distance.
 
-    Returns
-    -------
     Dataset over (away, spring): ``nearest`` (m), ``effort`` until the earliest arrival of that distance, and
     ``effort_part``, its ratio to the effort of legs at their limit all the time (1); over away: ``earliest`` (s),
     ``k_hat`` by the law (N*mm/deg).
@@ -164,19 +152,16 @@ def farther_targets(
         record = trials.together(trials.run(asked, folder))
         earliest = earliest_arrival(record)
         result = evaluate(record, earliest)
-        found.append(
-            xr.Dataset(
-                {
-                    "nearest": (both, result.nearest, {"units": "m"}),
-                    "effort": (both, result.effort, {"units": "rad^2*s"}),
-                    "effort_part": (both, result.effort / (2.0 * limit**2 * earliest), {"units": "1"}),
-                    "earliest": ((), earliest, {"units": "s"}),
-                    "k_hat": ((), laws.k_hat(target.radius)[0], {"units": PAPER_UNIT}),
-                },
-                coords={"away": ((), away, {"units": "m"}), "spring": over_springs(FARTHER_SPRINGS)},
-                attrs={"robot": robot.name, "bearing_deg": math.degrees(bearing)},
-            )
-        )
+        columns = {
+            "nearest": (both, result.nearest, {"units": "m"}),
+            "effort": (both, result.effort, {"units": "rad^2*s"}),
+            "effort_part": (both, result.effort / (2.0 * limit**2 * earliest), {"units": "1"}),
+            "earliest": ((), earliest, {"units": "s"}),
+            "k_hat": ((), laws.k_hat(target.radius)[0], {"units": PAPER_UNIT}),
+        }
+        coords = {"away": ((), away, {"units": "m"}), "spring": over_springs(FARTHER_SPRINGS)}
+        attrs = {"robot": robot.name, "bearing_deg": math.degrees(bearing)}
+        found.append(xr.Dataset(columns, coords, attrs))
     return xr.concat(found, "away")
 
 
@@ -184,20 +169,15 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
     """Minima of each criterion of a :class:`TurningTask`, in means over repeats, at an instant: 0 is the earliest
     arrival, 1 the paper's 23 s, 2 each walk's own.
 
-    Returns
-    -------
     Dataset over criterion: the ``spring`` of the smallest mean; ``at``, the vertex of a parabola in 1/k1 through it and
     its neighbours (the spring itself at an end of the grid); ``softest`` and ``stiffest`` of the springs that are not
     worse by a t test (seed by seed), all in N*mm/deg, and ``alike``, their number; the best spring is one of them in
     95 % of cases, as the tests share their level (Bonferroni); ``mean`` and ``error`` of the smallest.
     """
     at_instant = criteria.isel(instant=instant)
-    rows = np.array([_minimum(at_instant, name) for name in CRITERIA])
-    return xr.Dataset(
-        {name: ("criterion", column) for name, column in zip(_COLUMNS, rows.T, strict=True)},
-        coords={"criterion": list(CRITERIA)},
-        attrs={"seconds": float(at_instant.seconds)},
-    )
+    columns = zip(_COLUMNS, np.array([_minimum(at_instant, name) for name in CRITERIA]).T, strict=True)
+    data = {name: ("criterion", column) for name, column in columns}
+    return xr.Dataset(data, {"criterion": list(CRITERIA)}, {"seconds": float(at_instant.seconds)})
 
 
 def _minimum(criteria: xr.Dataset, name: str) -> tuple[float, ...]:

@@ -135,14 +135,8 @@ def strategy_tasks(
     for strategy, record in records.items():
         own = springs[strategy]
         criteria = _criteria(record, (when if np.isfinite(when) else duration, DURATION), own, repeats)
-        criteria.attrs = {
-            "robot": robot.name,
-            "target": str(target),
-            "strategy": strategy,
-            "duration_s": duration,
-            "earliest_arrival_s": earliest[strategy],
-            "radius_m": target.radius,
-        }
+        criteria.attrs = {"robot": robot.name, "target": str(target), "strategy": strategy, "duration_s": duration}
+        criteria.attrs |= {"earliest_arrival_s": earliest[strategy], "radius_m": target.radius}
         wanted = [ratio / 21.0 * _best(criteria) for ratio in (15.0, 21.0, 41.0)]
         nearest = [own[int(np.abs(np.log(np.asarray(own) / each)).argmin())] for each in wanted]
         paths = _paths(record, own, repeats, shown if shown and set(shown) <= set(own) else nearest)
@@ -158,19 +152,14 @@ def _best(criteria: xr.Dataset) -> float:
 def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequence[float], repeats: int) -> xr.Dataset:
     shape = (len(springs), repeats)
     found = [evaluate(record, time) for time in instants]
-    last, away = float(record.time[-1]), record.distance.transpose("robot", "time")
-    ends = np.where(np.isfinite(found[0].arrival), found[0].arrival, last).tolist()
+    arrival, away = found[0].arrival, record.distance.transpose("robot", "time")
     nearest = record.time.values[away.fillna(np.inf).argmin("time").values]
-    own = np.where(np.isfinite(found[0].arrival), found[0].arrival, nearest).tolist()
+    ends, own = (np.where(np.isfinite(arrival), arrival, each).tolist() for each in (float(record.time[-1]), nearest))
     alone = [evaluate(record.isel(robot=[index]), time) for index, time in enumerate(own)]
     until = np.array([efforts(record.isel(robot=[index]), end)[0] for index, end in enumerate(ends)])
     both = ("spring", "repeat")
-    names = {
-        "spring": over_springs(springs),
-        "instant": ["earliest arrival", "paper", "own"],
-        "repeat": np.arange(repeats),
-    }
-    data = xr.Dataset(coords=names)
+    instant = ["earliest arrival", "paper", "own"]
+    data = xr.Dataset(coords={"spring": over_springs(springs), "instant": instant, "repeat": np.arange(repeats)})
     data["seconds"] = ("instant", np.array([*instants, np.nan]), {"units": "s"})
     for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
         frozen = np.concatenate([getattr(each, name) for each in alone])
@@ -181,7 +170,7 @@ def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequen
         data[f"{name}_mean"] = data[name].mean("repeat", skipna=False, keep_attrs=True)
         error = data[name].std("repeat", ddof=1, skipna=False) / np.sqrt(repeats)
         data[f"{name}_error"] = error.assign_attrs(units=data[name].attrs["units"])
-    data["arrival"] = (both, found[0].arrival.reshape(shape), {"units": "s"})
+    data["arrival"] = (both, arrival.reshape(shape), {"units": "s"})
     data["nearest"] = (both, found[0].nearest.reshape(shape), {"units": "m"})
     labels = np.array([each.label for each in found[0].outcome], dtype=object)
     data["outcome"] = (both, labels.reshape(shape))
@@ -194,20 +183,15 @@ def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Se
     rows = [[springs.index(spring) * repeats + repeat for repeat in range(repeats)] for spring in shown]
     some = record.isel(robot=xr.DataArray(rows, dims=over[:2]), time=slice(None, None, _PATH_STEP))
     x, y = some.position.transpose("axis", *over).values
-    bearing = np.unwrap(some.bearing.transpose(*over).values, axis=2)
-    return xr.Dataset(
-        {
-            "x": (over, x, {"units": "m"}),
-            "y": (over, y, {"units": "m"}),
-            "distance": (over, some.distance.transpose(*over).values, {"units": "m"}),
-            "bearing": (over, bearing, {"units": "rad"}),
-        },
-        coords={
-            "shown": ("shown", np.asarray(shown, float), {"units": PAPER_UNIT}),
-            "repeat": np.arange(repeats),
-            "time": ("time", some.time.values, {"units": "s"}),
-        },
-    )
+    columns = {
+        "x": (over, x, {"units": "m"}),
+        "y": (over, y, {"units": "m"}),
+        "distance": (over, some.distance.transpose(*over).values, {"units": "m"}),
+        "bearing": (over, np.unwrap(some.bearing.transpose(*over).values, axis=2), {"units": "rad"}),
+    }
+    springs_ = ("shown", np.asarray(shown, float), {"units": PAPER_UNIT})
+    times = ("time", some.time.values, {"units": "s"})
+    return xr.Dataset(columns, {"shown": springs_, "repeat": np.arange(repeats), "time": times})
 
 
 def springs_by_outcome(criteria: xr.Dataset) -> dict[Outcome, list[float]]:
@@ -242,14 +226,18 @@ class LegYaw:
 
     def __str__(self) -> str:
         """Number of walks that arrive."""
-        (few, without), (many, with_) = (arrivals(each) for each in (self.alone, self.helped))
         left = int((self.alone.turned > 0.0).sum())
-        return f"{few} of {without} arrive ({left} turn left), with it {many} of {with_}"
+        return f"{counted(self.alone)} arrive ({left} turn left), with it {counted(self.helped)}"
 
 
 def arrivals(walks: xr.Dataset) -> tuple[int, int]:
     """Number of walks that arrive, and number of walks."""
     return int(np.nansum(walks.arrived)), int(np.isfinite(walks.arrived).sum())
+
+
+def counted(walks: xr.Dataset) -> str:
+    """Number of walks that arrive, of all, in words."""
+    return "{} of {}".format(*arrivals(walks))
 
 
 def by_leg_yaw(data: xr.Dataset) -> list[LegYaw]:
@@ -281,8 +269,6 @@ def without_leg_yaw(
     """The task of :func:`turning_task` with and without leg yaw (Fig. "without": five trials and nine), at values of k1
     (N*mm/deg) by name.
 
-    Returns
-    -------
     Dataset over (case, trial, time): ``x`` and ``y`` of module 1 (m); over (case, trial): ``arrived``, ``nearest`` (m)
     and ``turned``, the last heading (rad, left positive). Cases are the names, each ``leg_yaw`` or not, with
     ``spring``; where there are fewer trials than nine the rest is NaN.
@@ -295,17 +281,15 @@ def without_leg_yaw(
         result = evaluate(record, duration)
         some = record.isel(time=slice(None, None, _PATH_STEP))
         place = some.position.transpose("axis", "robot", "time")
-        case = xr.Dataset(
-            {
-                "x": (("trial", "time"), place.sel(axis="x").values, {"units": "m"}),
-                "y": (("trial", "time"), place.sel(axis="y").values, {"units": "m"}),
-                "arrived": ("trial", np.isfinite(result.arrival).astype(float), {"units": "1"}),
-                "nearest": ("trial", result.nearest, {"units": "m"}),
-                "turned": ("trial", _last(record.heading), {"units": "rad"}),
-            },
-            coords={"time": ("time", some.time.values, {"units": "s"}), "trial": np.arange(len(asked))},
-        )
-        cases.append(case.reindex(trial=np.arange(most)))
+        columns = {
+            "x": (("trial", "time"), place.sel(axis="x").values, {"units": "m"}),
+            "y": (("trial", "time"), place.sel(axis="y").values, {"units": "m"}),
+            "arrived": ("trial", np.isfinite(result.arrival).astype(float), {"units": "1"}),
+            "nearest": ("trial", result.nearest, {"units": "m"}),
+            "turned": ("trial", _last(record.heading), {"units": "rad"}),
+        }
+        coords = {"time": ("time", some.time.values, {"units": "s"}), "trial": np.arange(len(asked))}
+        cases.append(xr.Dataset(columns, coords).reindex(trial=np.arange(most)))
         progress((index + 1) / (2 * len(springs)), f"{name}, leg yaw {'on' if leg_yaw else 'off'}")
     data = xr.concat(cases, dim="case")
     data["leg_yaw"] = ("case", np.tile([False, True], len(springs)))

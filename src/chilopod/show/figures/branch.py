@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chilopod.show import style
@@ -20,7 +19,6 @@ _LINES: dict[str, Any] = {
     "undecided": (0, (4, 2, 1, 2)),
     "out of range": (0, (1, 2)),
 }
-_LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
 
 
 def panel(data: xr.Dataset) -> Panel:
@@ -29,7 +27,7 @@ def panel(data: xr.Dataset) -> Panel:
     return Panel(
         name="branch",
         title=f"Curved walks over {shown}",
-        draw=lambda narrow: _draw(data, narrow),
+        draw=_draw(data),
         alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; the legend names lines "
         "of parts that are not stable.",
         text=(),
@@ -46,8 +44,8 @@ def table(data: xr.Dataset) -> xr.Dataset:
     return found
 
 
-def _draw(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_LAYOUTS, narrow)
+@style.in_layouts(style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
+def _draw(axes: style.Mosaic, data: xr.Dataset) -> None:
     x = data.parameter.values
     verdicts = _between(data)
     unit = data.parameter.attrs["units"].replace("*", "·")
@@ -60,16 +58,14 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
 
     _curve(axes["B"], x, data.axis_radius.values, verdicts, style.BLUE, "body axis, (N−1) L / Σ|θ|")
     _curve(axes["B"], x, data.path_radius.values, verdicts, style.ORANGE, "path of module 1")
-    axes["B"].set(ylabel="radius (m)", title="Radius of the turn")
     # The radius grows without bound towards the pitchfork; what matters is what a robot can turn in.
-    axes["B"].set_ylim(0.0, 2.0)
+    axes["B"].set(ylim=(0.0, 2.0), ylabel="radius (m)", title="Radius of the turn")
 
     _curve(axes["C"], x, data.cost_of_transport.values, verdicts, style.GREEN, "")
     axes["C"].set(ylabel="cost of transport (1)", title="What it costs")
 
-    for axes_ in axes.values():
-        axes_.set_xlabel(label)
-        axes_.grid(True)
+    for each in axes.values():
+        style.finish(each, xlabel=label)
     _mark(axes["A"], data)
     bottom, top = axes["A"].get_ylim()
     axes["A"].set_ylim(top=top + 0.4 * (top - bottom))  # room for the legend
@@ -79,7 +75,6 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         for verdict in sorted(shown):
             axes["B"].plot([], [], color=style.GREY, linestyle=_LINES[verdict], label=verdict)
     axes["B"].legend(loc="upper left")
-    return figure
 
 
 def _between(data: xr.Dataset) -> list[str]:

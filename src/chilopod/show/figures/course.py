@@ -17,7 +17,7 @@ from chilopod.show.scene.outline import draw_spines
 from chilopod.steering import ARRIVAL_RADIUS, Verdict
 from chilopod.tasks.course import Driven
 
-_LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
+LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
 _ON_WHITE = {"fc": "white", "ec": "none", "pad": 0.4}
 _ARRIVED = Verdict.ARRIVED.label
 _WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is for targets that were reached
@@ -25,7 +25,7 @@ _WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is 
 
 def draw(done: Driven, narrow: bool = False) -> Figure:
     """The figure; call it within :func:`chilopod.show.style.house_style`."""
-    figure, axes = style.figure(*_LAYOUTS, narrow)
+    figure, axes = style.figure(*LAYOUTS, narrow)
     record = done.record
     _floor(axes["A"], record)
     axes["A"].set_title(title(done))
@@ -35,9 +35,8 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
         spring = units.from_si(1.0, "N*mm/deg") * walk.stiffness.isel(joint=0).broadcast_like(walk.time).values
         axes["B"].plot(walk.time, spring, color=color, linewidth=1.2)
         if "target" in walk:  # where none can be reached there is none
-            axes["C"].plot(walk.time, _bearing(walk), color=color, linewidth=1.2)
+            axes["C"].plot(walk.time, bearing(walk), color=color, linewidth=1.2)
     axes["B"].set_yscale("log")
-    axes["B"].set_ylabel("k1 (N·mm/deg)")
     # As on other axes, and not as powers of ten.
     axes["B"].yaxis.set_major_formatter("{x:g}")
     axes["B"].yaxis.set_minor_locator(LogLocator(subs=(2.0, 4.0, 6.0)))
@@ -48,11 +47,9 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
         where = {"xycoords": ("axes fraction", "data"), "color": style.VERMILLION, "bbox": _ON_WHITE}
         style.note(axes["B"], "bends below", (0.02, at), (0, 3), **where)
     axes["C"].axhline(0.0, color=style.GREY, linewidth=0.8)
-    axes["C"].set_ylabel("target angle (deg)")
-    for name in "BC":
+    for name, label in (("B", "k1 (N·mm/deg)"), ("C", "target angle (deg)")):
         _turns(axes[name], record.isel(robot=0), numbered=name == "B")
-        axes[name].set_xlabel("time (s)")
-        axes[name].grid(True, axis="y")
+        style.finish(axes[name], "y", xlabel="time (s)", ylabel=label)
     return figure
 
 
@@ -62,7 +59,7 @@ def title(done: Driven) -> str:
     return f"{done.strategy.name}: {reached.sum()} of {reached.size} targets"
 
 
-def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
+def bearing(walk: xr.Dataset) -> NDArray[np.float64]:
     """Bearing of the present target, deg, without lines across its jumps."""
     # One that was the target all the time has one place for all times.
     target = walk.target.broadcast_like(walk.position).transpose("time", "axis").values
@@ -106,8 +103,7 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
     ends, walked = first.goal_end.values[0], first.time.values[np.isfinite(first.heading.values[:, 0])]
     moments = np.unique(np.clip([0.0, *ends[np.isfinite(ends)]], walked[0], walked[-1]))
     draw_spines(axes, body_frames(first, moments).spine[:, 0])
-    axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.grid(True)
+    style.finish(axes, xlabel="x (m)", ylabel="y (m)")
 
 
 def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chilopod.frozen import Array
@@ -17,8 +16,6 @@ from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
 from chilopod.tasks.identify import Identification, RecordedIdentification, TwinIdentification
 
-_WIDE = style.Layout("ABC;DEF", 6.2)
-_NARROW = style.Layout("A;B;C;D;E;F", 17.0)
 _COLUMNS = {
     *("friction", "half_width", "largest_residual", "critical_k1"),
     *("uniform", "coefficient", "verdict"),
@@ -37,17 +34,16 @@ def panel(found: Identification | RecordedIdentification | TwinIdentification) -
     return Panel(
         name="identification",
         title="Data as computed with the best constants",
-        draw=lambda narrow: _draw_data(found, narrow),
+        draw=_draw_data(found),
         alt="Joint angles over time, dots as recorded and lines as computed, or the residual of each datum.",
         text=tuple(found.lines()),
         data=data,
     )
 
 
-def _draw_data(found: RecordedIdentification | TwinIdentification, narrow: bool) -> Figure:
-    figure, axes = style.figure(style.Layout("A", 5.0), style.Layout("A", 5.0), narrow)
+@style.in_layouts(style.Layout("A", 5.0), style.Layout("A", 5.0))
+def _draw_data(axes: style.Mosaic, found: RecordedIdentification | TwinIdentification) -> None:
     found.plot(axes["A"])
-    return figure
 
 
 def _profiles(fit: Identification) -> Panel:
@@ -58,7 +54,7 @@ def _profiles(fit: Identification) -> Panel:
     return Panel(
         name="identification",
         title="The constants of the feet",
-        draw=lambda narrow: _draw(fit, narrow),
+        draw=_draw(fit),
         alt="Six profiles over the forward offset of the feet: largest residual, friction, half-width, predictions for "
         "the variants and for uniform springs, and the coefficient of the pitchfork with its change of sign.",
         text=(
@@ -99,7 +95,7 @@ def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
 
     def span(name: str) -> str:
         values = data[name].values[inside & np.isfinite(data[name].values)]
-        return f"{number(float(values.min()))} to {number(float(values.max()))}" if values.size else "not found"
+        return f"{number(values.min())} to {number(values.max())}" if values.size else "not found"
 
     variants = listing(f"{span(name)} for {typeset(name)}" for name in _variants_of(data))
     others = f"Along the shaded valley the critical spring of variants, which were not fitted, is {variants}. "
@@ -131,9 +127,9 @@ def _changes(data: xr.Dataset) -> Array:
     return np.asarray(x[at] - y[at] * (x[at + 1] - x[at]) / (y[at + 1] - y[at]))
 
 
-def _draw(fit: Identification, narrow: bool) -> Figure:
+@style.in_layouts(style.Layout("ABC;DEF", 6.2), style.Layout("A;B;C;D;E;F", 17.0))
+def _draw(axes: style.Mosaic, fit: Identification) -> None:
     data = fit.profile
-    figure, axes = style.figure(_WIDE, _NARROW, narrow)
     x = 1e3 * data.forward_offset.values
     allowed = fit.allowed("legs.forward_offset")
     for one in axes.values():
@@ -150,8 +146,7 @@ def _draw(fit: Identification, narrow: bool) -> Figure:
     _variants(axes["D"], x, data)
     _fitted(axes["E"], x, data.uniform.values, "Not fitted: uniform springs", f"critical k ({SPRING_UNIT})")
     _coefficient(axes["F"], x, data)
-    figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside upper left", ncols=1 if narrow else 4)
-    return figure
+    axes.figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside upper left", ncols=1 if axes.narrow else 4)
 
 
 def _fitted(axes: Axes, x: Array, values: Array, title: str, label: str) -> None:

@@ -12,19 +12,19 @@ from matplotlib.patches import Circle
 
 from chilopod import units
 from chilopod.show import style
+from chilopod.show.figures.course import LAYOUTS, bearing
 from chilopod.show.scene.frames import body_frames
 from chilopod.show.scene.outline import draw_spines
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks import Turn
 
-_LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
 _STILLS = 5
 
 
 def draw(done: Turn, narrow: bool = False) -> Figure:
     """The figure; call it within :func:`chilopod.show.style.house_style`."""
-    figure, axes = style.figure(*_LAYOUTS, narrow)
-    record = done.record[["position", "distance", "bearing"]]
+    figure, axes = style.figure(*LAYOUTS, narrow)
+    record = done.record[["position", "distance", "bearing", "target"]]
     walks = [
         walk.where(walk.time <= end, drop=True) if np.isfinite(end) else walk
         for walk, end in ((record.isel(robot=robot), end) for robot, end in enumerate(done.criteria.arrival))
@@ -34,21 +34,14 @@ def draw(done: Turn, narrow: bool = False) -> Figure:
     for robot, walk in enumerate(walks):
         color = style.CURVES[robot % len(style.CURVES)]
         axes["B"].plot(walk.time, walk.distance, color=color)
-        # A line does not cross the picture where the angle jumps from -180 to 180.
-        angle = np.rad2deg(walk.bearing.values)
-        angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan
-        axes["C"].plot(walk.time, angle, color=color)
+        axes["C"].plot(walk.time, bearing(walk), color=color)
     axes["B"].axhline(ARRIVAL_RADIUS, color=style.GREY, linestyle=(0, (4, 2)), linewidth=1.2)
     style.note(
         axes["B"], "arrived below", (0.02, ARRIVAL_RADIUS), (0, 3), xycoords=("axes fraction", "data"), color=style.GREY
     )
-    axes["B"].set_ylim(bottom=0.0)
-    axes["B"].set_ylabel("target distance (m)")
+    style.finish(axes["B"], ylim=(0.0, None), xlabel="time (s)", ylabel="target distance (m)")
     axes["C"].axhline(0.0, color=style.GREY, linewidth=0.8)
-    axes["C"].set_ylabel("target angle (deg)")
-    for name in "BC":
-        axes[name].set_xlabel("time (s)")
-        axes[name].grid(True)
+    style.finish(axes["C"], xlabel="time (s)", ylabel="target angle (deg)")
     return figure
 
 
@@ -87,6 +80,4 @@ def _floor(axes: Axes, done: Turn, walks: Sequence[xr.Dataset]) -> None:
     axes.plot(
         *target, "+", color=style.SCENE["target"], markersize=9, markeredgewidth=2, label="target", linestyle="none"
     )
-    axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.legend(loc="best")
-    axes.grid(True)
+    style.finish(axes, legend="best", xlabel="x (m)", ylabel="y (m)")

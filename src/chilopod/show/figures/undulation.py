@@ -8,13 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import number, spring
-
-_LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
 
 
 def panel(data: xr.Dataset) -> Panel:
@@ -24,7 +21,7 @@ def panel(data: xr.Dataset) -> Panel:
     return Panel(
         name="undulation",
         title="Undulating walks of uniform springs",
-        draw=lambda narrow: _draw(data, narrow),
+        draw=_draw(data),
         alt="Amplitude and frequency of the settled undulation over the springs, and how far the normal form is off, "
         "in proportion to the distance from the point.",
         text=(
@@ -36,8 +33,8 @@ def panel(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_LAYOUTS, narrow)
+@style.in_layouts(style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
+def _draw(axes: style.Mosaic, data: xr.Dataset) -> None:
     data = data.sortby("distance")
     distance, k = data.distance.values, data.k.values
     label = f"all springs ({data.attrs['unit'].replace('*', '·')})"
@@ -68,13 +65,10 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     look: dict[str, Any] = {"color": style.VERMILLION, "label": "Neimark-Sacker", "zorder": 5, "clip_on": False}
     for letter, value in (("A", 0.0), ("B", first)):
         axes[letter].plot(data.attrs["value"], value, "D", **look)
+    places = {"A": "lower left", "B": "best", "C": "upper left"}
     for letter, each in axes.items():
-        each.set_xlabel("distance below the point (%)" if letter == "C" else label)
-        each.grid(True)
-    axes["A"].legend(loc="lower left")
-    axes["B"].legend(loc="best")
-    axes["C"].legend(loc="upper left")
-    return figure
+        below = "distance below the point (%)" if letter == "C" else label
+        style.finish(each, legend=places[letter], xlabel=below)
 
 
 def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, name: str) -> None:

@@ -204,15 +204,9 @@ def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: 
     frames = body_frames(record, times)
     aims = aims_of(record)
     radius = ARRIVAL_RADIUS if any(aims) else 0.0
-    return Scene(
-        frames,
-        _floor(frames, places_of(aims), radius),
-        _titles(record, titles),
-        tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(aims)),
-        aims,
-        radius,
-        _springs(record, frames),
-    )
+    floor, named = _floor(frames, places_of(aims), radius), _titles(record, titles)
+    outcomes = tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(aims))
+    return Scene(frames, floor, named, outcomes, aims, radius, _springs(record, frames))
 
 
 def aims_of(record: xr.Dataset) -> tuple[tuple[Aim, ...], ...]:

@@ -38,14 +38,9 @@ def turned_about_tail(centres: Array, headings: Array, joints: Array) -> tuple[A
 def draw_modules(axes: Axes, centres: Array, headings: Array, length: float, **look: Any) -> None:
     """Draw modules as rounded boxes; `look` as for a patch."""
     gap, width = 0.04 * length, SLIMNESS * length
+    corner, shape = (-0.5 * length + gap, -0.5 * width), f"round,pad=0,rounding_size={0.4 * width}"
     for (x, y), heading in zip(centres, headings, strict=True):
-        box = FancyBboxPatch(
-            (-0.5 * length + gap, -0.5 * width),
-            length - 2.0 * gap,
-            width,
-            boxstyle=f"round,pad=0,rounding_size={0.4 * width}",
-            **look,
-        )
+        box = FancyBboxPatch(corner, length - 2.0 * gap, width, boxstyle=shape, **look)
         box.set_transform(Affine2D().rotate(heading).translate(x, y) + axes.transData)
         axes.add_patch(box)
 

@@ -112,15 +112,9 @@ def _page(name: str, shown: Scene, heading: str, view: str, data: Mapping[str, A
         "springs": {"thin": THIN, "stiffest": units.from_si(float(np.nanmax(shown.springs, initial=0.0)), "N*mm/deg")},
         "arrivalRadius": shown.arrival_radius,
     }
-    return template("chilopod.show.scene", name).render(
-        heading=heading,
-        panels=panels,
-        colors=SCENE,
-        grid=f"{floor.grid:g} m",
-        has_targets=any(shown.aims),
-        data={**common, **data, "robots": robots},
-        **words,
-    )
+    said = {"heading": heading, "panels": panels, "colors": SCENE, "grid": f"{floor.grid:g} m", **words}
+    data = {**common, **data, "robots": robots}
+    return template("chilopod.show.scene", name).render(said, has_targets=any(shown.aims), data=data)
 
 
 def _in_steps(shares: Array) -> NDArray[np.uint16]:

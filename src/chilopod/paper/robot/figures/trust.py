@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullLocator
 
@@ -18,16 +17,13 @@ from chilopod.paper.robot.spread import VALLEYS, printed_number
 from chilopod.paper.robot.structures import TOLERANCE
 from chilopod.paper.robot.walks import SPRINGS
 from chilopod.paper.robot.why import ORDERS, SEARCHED, cause
-from chilopod.paper.shapes import DASHED, draw_bands, finish, legend_below
+from chilopod.paper.shapes import DASHED, draw_bands, finish
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, spring, typeset
 from chilopod.tasks.identify.data import FITTED, WITH_FRICTION
 from chilopod.tasks.identify.valley import LEAST
 
-_WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
-_SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
-_STRUCTURES = (style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
 _MET = 1.0  # misfit at which the base series is met
 _FARTHEST = 60.0  # per cent, where predictions are cut off
 _MOST = 100.0  # chi squared, where bars are cut off
@@ -49,7 +45,7 @@ def why(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-why",
         title=f"Why {printed.ONSET.value:g} and not {printed.CRITICAL_K1.value:g}: from the planar model to the robot",
-        draw=lambda narrow: _draw_why(data, narrow),
+        draw=_draw_why(data),
         alt="A: by how much each assumption of the planar model multiplies the spring at which the straight walk ends. "
         "B: that spring in the planar limit with one assumption less, and of the twin with one more.",
         text=(
@@ -57,7 +53,7 @@ def why(data: xr.Dataset) -> Panel:
             f"the planar model in another engine: its straight walk ends at {spring(data.attrs['vouched'])}, that "
             f"of the planar model at {spring(data.attrs['exact'])}.",
             f"{cause(data)}. Multipliers of bends of 1° tell where the straight walk ends, in the planar limit at "
-            f"{spring(float(data.end[0]), 3)}, in the twin at {spring(float(data.end[-1]), 3)}. "
+            f"{spring(data.end[0], 3)}, in the twin at {spring(data.end[-1], 3)}. "
             f"{data.sizes['subset']} subsets of {data.sizes['factor']} assumptions were removed; {inside} of them end "
             f"between {SEARCHED[0]:g} and {spring(SEARCHED[1], 3)}, the others count as the end that they are beyond. "
             f"A is the mean over all orders in which assumptions are removed, with what {100.0 * ORDERS:.0f} % of the "
@@ -71,11 +67,11 @@ def why(data: xr.Dataset) -> Panel:
 
 
 def _times(value: float) -> str:
-    return f"×{number(float(value), 3)}" if np.isfinite(value) else "?"
+    return f"×{number(value, 3)}" if np.isfinite(value) else "?"
 
 
-def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_WHY, narrow)
+@style.in_layouts(style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
+def _draw_why(axes: style.Mosaic, data: xr.Dataset) -> None:
     rows = np.arange(data.sizes["factor"])
     span = np.abs(np.array([data.share_low, data.share_high]) - data.share.values)
     axes["A"].errorbar(data.share, rows, xerr=np.nan_to_num(span), fmt="o", color=style.BLUE, capsize=3.0)
@@ -84,17 +80,18 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
     _bars(axes["B"], rows + 0.19, data.without.values, [style.ORANGE] * len(rows), 0.34)
     axes["B"].set_title("B  Each by itself")
     for value, color, name in ((data.end[0], style.GREY, "planar limit"), (data.end[-1], style.VERMILLION, "twin")):
-        label = f"{name}, {number(float(value), 2)}"
+        label = f"{name}, {number(value, 2)}"
         axes["B"].axvline(value, color=color, lw=1.2, linestyle=DASHED, label=label)
     for letter in "AB":
-        axes[letter].set_yticks(rows, [str(name) for name in data.factor.values] if letter == "A" or narrow else [])
+        axes[letter].set_yticks(
+            rows, [str(name) for name in data.factor.values] if letter == "A" or axes.narrow else []
+        )
         axes[letter].invert_yaxis()
     finish(axes["B"], "x", xlim=(0.0, SEARCHED[1]), xlabel=f"end of the straight walk ({SPRING_UNIT})")
     handles, labels = axes["B"].get_legend_handles_labels()
     handles += [Patch(color=style.SKY), Patch(color=style.ORANGE)]
     labels += ["planar limit and this alone", "twin without this"]
-    figure.legend(handles, labels, loc="outside lower center", ncols=1 if narrow else 4)
-    return figure
+    axes.figure.legend(handles, labels, loc="outside lower center", ncols=1 if axes.narrow else 4)
 
 
 def _times_axis(axes: Axes, title: str) -> None:
@@ -119,7 +116,7 @@ def why_sets(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-why-sets",
         title="The reasons, by other constants that fit as well",
-        draw=lambda narrow: _draw_why_sets(data, narrow),
+        draw=_draw_why_sets(data),
         alt="By how much each assumption multiplies the spring at which the walk ends, for several sets of constants.",
         text=(
             f"The preset (filled), and {others.sizes['set']} sets drawn from the valley of constants that the data "
@@ -131,8 +128,8 @@ def why_sets(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_why_sets(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(style.Layout("A", 4.2), style.Layout("A", 4.6), narrow)
+@style.in_layouts(style.Layout("A", 4.2), style.Layout("A", 4.6))
+def _draw_why_sets(axes: style.Mosaic, data: xr.Dataset) -> None:
     count = data.sizes["set"]
     for index, parts in enumerate(data.share.values):
         rows = np.arange(parts.size) + 0.5 * (index / max(count - 1, 1) - 0.5)
@@ -142,8 +139,7 @@ def _draw_why_sets(data: xr.Dataset, narrow: bool) -> Figure:
     axes["A"].set_yticks(range(data.sizes["factor"]), [str(name) for name in data.factor.values])
     axes["A"].invert_yaxis()
     _times_axis(axes["A"], "Part of each")
-    figure.legend(*axes["A"].get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return figure
+    axes.legend_below("A", 2, 2)
 
 
 def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], height: float) -> None:
@@ -151,7 +147,7 @@ def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], h
         if np.isnan(value):
             continue
         axes.barh(row, value, height, color=color)
-        text = f"{value:g} or more" if value == SEARCHED[1] else number(float(value), 3)
+        text = f"{value:g} or more" if value == SEARCHED[1] else number(value, 3)
         away, side, ink = (-4, "right", "white") if value > 0.8 * SEARCHED[1] else (4, "left", style.BLACK)
         style.note(axes, text, (value, row), (away, 0), va="center", ha=side, color=ink)
 
@@ -184,7 +180,7 @@ def spread(data: xr.Dataset) -> Panel:
     return Panel(
         name="robot-spread",
         title="How far to trust the predictions: the valleys of constants that the data leave open",
-        draw=lambda narrow: _draw_spread(data, narrow),
+        draw=_draw_spread(data),
         alt="A: the constants of several sets, in parts of their ranges. B: what each predicts, beside the robot.",
         text=tuple(text),
         data=data,
@@ -207,7 +203,7 @@ def _predicted(found: xr.Dataset) -> str:
     said = []
     for name, values in _points(found).items():
         if count := int(np.isfinite(values).sum()):
-            mean, low, high = (number(float(each), 3) for each in (values.mean(), values.min(), values.max()))
+            mean, low, high = (number(each, 3) for each in (values.mean(), values.min(), values.max()))
             spread = f"{low} to {high}, " if count >= _FEWEST else ""
             said.append(f"{name} {mean} ({spread}{count} of {values.size} sets have one)")
     return listing(said) or "no point"
@@ -236,15 +232,15 @@ def _refitted(found: xr.Dataset) -> str:
     means = []
     for each, values in _points(found).items():
         known = np.isfinite(values.values)
-        means.append(f"{each} {number(float(np.average(values.values[known], weights=weights[known])), 3)}")
+        means.append(f"{each} {number(np.average(values.values[known], weights=weights[known]), 3)}")
     return (
         f"{said}, a fit and no prediction, {found.sizes['set']} sets count as {number(effective, 2)}: yaw friction "
         f"{number(1e3 * yaw, 2)}\u00a0mN·m, {listing(means)} on average."
     )
 
 
-def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_SPREAD, narrow)
+@style.in_layouts(style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
+def _draw_spread(axes: style.Mosaic, data: xr.Dataset) -> None:
     paths = WITH_FRICTION.paths
     for index in data.set.values[::-1]:
         parts = WITH_FRICTION.parts_of(data.constants.values[index])
@@ -267,8 +263,7 @@ def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
             axes["B"].plot(value, place, "o", **_marked(data, index), label=label)
     axes["B"].set(xlim=(10.0, max(45.0, *SPRINGS[:-1])), xlabel=SPRING_UNIT, title="B  Predictions")
     # Inside it would hide points.
-    figure.legend(*axes["B"].get_legend_handles_labels(), loc="outside lower center", ncols=2 if narrow else 4)
-    return figure
+    axes.legend_below("B", 4, 2)
 
 
 def _marked(data: xr.Dataset, index: int) -> dict[str, Any]:
@@ -292,26 +287,21 @@ def structures(data: xr.Dataset) -> Panel:
     ratio = data.criteria.sel(strategy="pitchfork") / data.criteria.sel(strategy="hopf")
     below = (ratio < 1.0).all("criterion").values
     lower = [str(name) for name, yes in zip(data.structure.values, below & met, strict=True) if yes]
+    tried = [f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)]
     return Panel(
         name="robot-structures",
         title="What else the robot could be made of",
-        draw=lambda narrow: _draw_structures(data, narrow),
+        draw=_draw_structures(data),
         alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
         text=(
             f"Each of these structures was given to the preset, and its {len(FITTED.paths)} constants moved until it "
-            "meets the base series again, from few and undisturbed walks: "
-            + "; ".join(
-                f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)
-            )
-            + ".",
+            f"meets the base series again, from few and undisturbed walks: {'; '.join(tried)}.",
             f"A adds up the squares of how far its predictions are from the paper's, over {100.0 * TOLERANCE:g} %: the "
-            f"preset has {_squares(squared[0])}, "
-            + (f"less have {listing(better)}." if better else "none has less.")
+            f"preset has {_squares(squared[0])}, {f'less have {listing(better)}' if better else 'none has less'}."
             + (f" Pale: {listing(missed)}, which did not meet the base series within its tolerance." if missed else "")
             + " For the shorter stride the nearer of its two readings counts.",
             "In task A the smallest criteria of one soft spring are all three below those of springs all alike with "
-            + (listing(lower) if lower else "none of those that meet it")
-            + ".",
+            f"{listing(lower) or 'none of those that meet it'}.",
         ),
         data=data,
     )
@@ -323,8 +313,8 @@ def _squares(value: float) -> str:
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
 
 
-def _draw_structures(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_STRUCTURES, narrow)
+@style.in_layouts(style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
+def _draw_structures(axes: style.Mosaic, data: xr.Dataset) -> None:
     rows = np.arange(data.sizes["structure"])
     met = data.misfit.sel(fit="fitted").values <= _MET
     names = [str(name) for name in data.structure.values]
@@ -340,10 +330,9 @@ def _draw_structures(data: xr.Dataset, narrow: bool) -> Figure:
         values = np.clip(off.values[:, column], -_FARTHEST, _FARTHEST)
         marker, color = _MARKERS[column % len(_MARKERS)], style.CURVES[column % len(style.CURVES)]
         axes["B"].plot(values, rows, marker, color=color, markersize=6, label=typeset(str(name)))
-    axes["B"].set_yticks(rows, names if narrow else [""] * len(names))
+    axes["B"].set_yticks(rows, names if axes.narrow else [""] * len(names))
     axes["B"].set(xlim=(-_FARTHEST - 3.0, _FARTHEST + 3.0), title="B  Predictions")
     for letter, label in (("A", "chi squared"), ("B", "onset relative to the paper's (%)")):
         axes[letter].invert_yaxis()
         finish(axes[letter], "x", xlabel=label)
-    legend_below(figure, axes["B"], 1 if narrow else 3)
-    return figure
+    axes.legend_below("B", 3)

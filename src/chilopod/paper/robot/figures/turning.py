@@ -6,23 +6,21 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from chilopod.paper import printed
 from chilopod.paper.measures import spring_for
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.turning import INSTANTS, RobotTurning, verdict
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.shapes import DASHED, finish, legend_below
+from chilopod.paper.shapes import DASHED, finish
 from chilopod.paper.statements import listed
 from chilopod.paper.turning import figures as planar
 from chilopod.paper.turning.study import in_words, saturation
-from chilopod.paper.turning.trials import TurningTask, arrivals, by_leg_yaw, outcome_words
+from chilopod.paper.turning.trials import TurningTask, by_leg_yaw, counted, outcome_words
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
 
-_STRATEGIES = (style.Layout("A", 3.6), style.Layout("A", 4.0))
 _TOP = (75, 41, 28, 21, 15, 10)
 _TOP_HOPF = (75, 41, 21, 15, 11, 8.7)
 
@@ -44,7 +42,7 @@ def turning(found: RobotTurning) -> Panel:
     return Panel(
         name="robot-turning",
         title="The robot in three dimensions: turning task A",
-        draw=lambda narrow: planar.draw_turning(found.robot, task, narrow),
+        draw=planar.draw_turning(found.robot, task),
         alt="The circle to the target; paths, distance and angle of the target over time with three springs.",
         text=(
             "The twin sees the target with its scanner, as the robot does, and yaws the legs of module 1 towards it; "
@@ -65,7 +63,7 @@ def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Pane
     return Panel(
         name=f"robot-criteria-{letter.lower()}",
         title=f"The robot in three dimensions: the three criteria, task {letter}",
-        draw=lambda narrow: planar.draw_criteria({planar.walks_of(task): task}, narrow, _TOP, k_hat=k_hat),
+        draw=planar.draw_criteria({planar.walks_of(task): task}, _TOP, k_hat=k_hat),
         alt=f"Distance, angle and leg yaw over 1/{k(1)}: {planar.places(task)}.",
         text=(
             f"Means and standard errors of {task.criteria.sizes['repeat']} walks at {number(task.time)}\u00a0s. "
@@ -82,15 +80,14 @@ def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Pane
 def without(found: RobotTurning) -> Panel:
     """Fig. "without"."""
     data, (case,) = found.without, by_leg_yaw(found.without)
-    (few, walks), (many, with_) = arrivals(case.alone), arrivals(case.helped)
     return Panel(
         name="robot-without",
         title="The robot in three dimensions: with and without leg yaw",
         draw=lambda narrow: planar.draw_without(data, narrow),
         alt="Paths of module 1 with and without leg yaw.",
         text=(
-            f"Task A with {k(1)} = {case.spring:g}\u00a0{SPRING_UNIT}. Without leg yaw {few} of {walks} arrive, "
-            f"{planar.sides(case)}: the bend takes its time, and chance has the side. With it {many} of {with_} "
+            f"Task A with {k(1)} = {case.spring:g}\u00a0{SPRING_UNIT}. Without leg yaw {counted(case.alone)} arrive, "
+            f"{planar.sides(case)}: the bend takes its time, and chance has the side. With it {counted(case.helped)} "
             "arrive. The paper's robot: many of nine fail, all of five do not.",
         ),
         data=data,
@@ -103,7 +100,7 @@ def comparison(found: RobotTurning, hopf: TurningTask) -> Panel:
     return Panel(
         name="robot-hopf",
         title="The robot in three dimensions: pitchfork against Hopf",
-        draw=lambda narrow: planar.draw_comparison(task, hopf, narrow, _TOP_HOPF),
+        draw=planar.draw_comparison(task, hopf, _TOP_HOPF),
         alt="The three criteria over the spring for the two strategies.",
         text=(
             "Task A with all springs alike, the paper's five values, with the same disturbances. Criteria are taken at "
@@ -122,13 +119,13 @@ def strategies(data: xr.Dataset) -> Panel:
     parts = []
     for limit in data.limit.values:
         at = data.sel(limit=limit, instant=INSTANTS[0])
-        numbers = [f"{number(float(one), 3)} ({number(float(low), 3)} to {number(float(high), 3)})"
+        numbers = [f"{number(one, 3)} ({number(low, 3)} to {number(high, 3)})"
                    for one, low, high in zip(at.ratio, at.low, at.high, strict=True)]  # fmt: skip
         parts.append(f"{limit:g}° {listing(numbers)}")
     return Panel(
         name="robot-strategies",
         title="The robot in three dimensions: pitchfork against Hopf, by how far legs yaw",
-        draw=lambda narrow: _draw_strategies(data, narrow),
+        draw=_draw_strategies(data),
         alt="Ratio of the smallest criteria of the two strategies, with intervals, for three limits of the leg yaw.",
         text=(
             f"Task A, {data.attrs['repeats']} walks with each spring. {verdict(data)}. Smallest ε1, ε2 and ε3 of the "
@@ -140,8 +137,8 @@ def strategies(data: xr.Dataset) -> Panel:
     )
 
 
-def _draw_strategies(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_STRATEGIES, narrow)
+@style.in_layouts(style.Layout("A", 3.6), style.Layout("A", 4.0))
+def _draw_strategies(axes: style.Mosaic, data: xr.Dataset) -> None:
     rows, at = np.arange(data.sizes["criterion"]), data.sel(instant=INSTANTS[0])
     for index, limit in enumerate(data.limit.values):
         one = at.sel(limit=limit)
@@ -152,5 +149,4 @@ def _draw_strategies(data: xr.Dataset, narrow: bool) -> Figure:
     axes["A"].set_yticks(rows, list(CRITERION_NAMES.values()))
     axes["A"].invert_yaxis()
     finish(axes["A"], "x", xlabel="pitchfork over Hopf")
-    legend_below(figure, axes["A"], 3)
-    return figure
+    axes.legend_below("A", 3, 3)

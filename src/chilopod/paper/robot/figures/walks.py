@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from chilopod.paper import printed, shapes, statements
 from chilopod.paper.measures import onset_of_bend, onset_point, radius_at
@@ -19,8 +18,6 @@ from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
 from chilopod.statistics import means
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
 
-_THREE = (style.Layout("AB;CC", 7.6), style.Layout("A;B;C", 12.6))
-_DURATIONS = (style.Layout("ABC", 3.6), style.Layout("A;B;C", 9.6))
 _VARIANTS = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.ORANGE, style.GREY), "os^Dv", strict=True))
 _SPRINGS = tuple(zip((style.BLUE, style.VERMILLION, style.GREEN, style.ORANGE), "os^D", strict=True))
 _SIDES = {
@@ -50,7 +47,7 @@ def walks(found: RobotWalks) -> Panel:
     return Panel(
         name="robot-walks",
         title="The robot in three dimensions: curved walks below the critical spring",
-        draw=lambda narrow: _draw_walks(found, narrow),
+        draw=_draw_walks(found),
         alt=f"A and B: joint angles over time at {k(1)} = {straight:g} and {curved:g}. C: mean angle of joint 1 over "
         f"1/{k(1)} with the fitted square root. D: radius of the body axis with the two radii that the paper prints.",
         text=(
@@ -80,7 +77,7 @@ def joints(found: RobotWalks) -> Panel:
     return Panel(
         name="robot-joints",
         title="The robot in three dimensions: all joints of the curved walk",
-        draw=lambda narrow: _draw_joints(found, narrow),
+        draw=_draw_joints(found),
         alt=f"Mean absolute angles of all joints over 1/{k(1)}.",
         text=(
             "Mean absolute angle of every joint (means and standard errors). At the softest spring the joints bend in "
@@ -97,10 +94,12 @@ def different(found: RobotWalks, uniform: xr.Dataset) -> Panel:
     for title, (name, data) in _variants(found).items():
         point, paper = onset_point(data).value, printed.onset(name).value
         said.append(f"{typeset(title)} {number(point, 3) if np.isfinite(point) else 'none'} (robot: {paper:g})")
+    each = [data.assign_coords(variant=name) for name, data in _all(found).items()]
+    data = xr.concat(each, "variant", join="outer", combine_attrs="drop_conflicts")
     return Panel(
         name="robot-different",
         title="The robot in three dimensions: other springs, strides and phases",
-        draw=lambda narrow: _draw_different(found, uniform, narrow),
+        draw=_draw_different(found, uniform),
         alt=f"A: radius over 1/{k(1)} of the robot as built and of three variants. B: the same over the distance from "
         "each one's own onset. C: where curved walks set in, twin beside robot.",
         text=(
@@ -117,12 +116,7 @@ def different(found: RobotWalks, uniform: xr.Dataset) -> Panel:
                 else ""
             ),
         ),
-        data=xr.concat(
-            [each.assign_coords(variant=name) for name, each in _all(found).items()],
-            dim="variant",
-            join="outer",
-            combine_attrs="drop_conflicts",
-        ).drop_vars(("direction", "status")),
+        data=data.drop_vars(("direction", "status")),
     )
 
 
@@ -149,7 +143,7 @@ def durations(found: RobotWalks) -> Panel:
     return Panel(
         name="robot-durations",
         title="The robot in three dimensions: what if its walks had been shorter",
-        draw=lambda narrow: _draw_durations(data, narrow),
+        draw=_draw_durations(data),
         alt=f"A: where curved walks set in, by walks of {times} s. B: the two radii that the paper prints. C: the "
         "share of walks that curve at some springs.",
         text=(
@@ -163,9 +157,9 @@ def durations(found: RobotWalks) -> Panel:
     )
 
 
-def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
-    figure, axes = style.figure(*shapes.WALKS, narrow)
-    shapes.draw_examples(axes, found.examples, narrow)
+@style.in_layouts(*shapes.WALKS)
+def _draw_walks(axes: style.Mosaic, found: RobotWalks) -> None:
+    shapes.draw_examples(axes, found.examples)
     base, fit, paper = found.base, found.fit, printed.ONSET.value
     inverse = 1.0 / base.spring.values
     # The legend stands above the line.
@@ -180,22 +174,20 @@ def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
     highest = np.nanmax([*(radius + np.nan_to_num(error)), *(each.value for each in printed.RADII.values())])
     axes["D"].set(ylim=(0.0, 1.1 * highest), xlim=(0.02, 1.06 * inverse.max()))
     shapes.over_compliance(axes["D"], (41.0, 28.0, 21.0, 17.0, 15.0))
-    return figure
 
 
-def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
-    figure, axes = style.figure(*shapes.JOINTS, narrow)
+@style.in_layouts(*shapes.JOINTS)
+def _draw_joints(axes: style.Mosaic, found: RobotWalks) -> None:
     inverse = 1.0 / found.base.spring.values
     angles = np.rad2deg(np.abs(found.base.mean_angle).mean("repeat").transpose("spring", "joint").values)
     shapes.draw_joints(axes["A"], found.base, True, inverse, angles)
     axes["A"].set_xlim(0.0, 1.06 * inverse.max())
     axes["A"].set_ylim(bottom=0.0)
     shapes.over_compliance(axes["A"], (75.0, 41.0, 28.0, 21.0, 17.0, 15.0))
-    return figure
 
 
-def _draw_different(found: RobotWalks, uniform: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_THREE, narrow)
+@style.in_layouts(style.Layout("AB;CC", 7.6), style.Layout("A;B;C", 12.6))
+def _draw_different(axes: style.Mosaic, found: RobotWalks, uniform: xr.Dataset) -> None:
     for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=False):
         inverse = 1.0 / data.spring.values
         found_here = [radius_at(data, float(spring)) for spring in data.spring.values]
@@ -210,9 +202,8 @@ def _draw_different(found: RobotWalks, uniform: xr.Dataset, narrow: bool) -> Fig
     axes["A"].set_title("A  Radius over the spring")
     axes["B"].set_xlim(left=0.0)
     axes["B"].set(xlabel=f"1/{k(1)} − 1/{k(1)}* ({shapes.INVERSE_UNIT})", title="B  Radius, like with like")
-    shapes.legend_below(figure, axes["A"], 2 if narrow else 5)
+    axes.legend_below("A", 5, 2)
     _draw_onsets(axes["C"], found, uniform)
-    return figure
 
 
 def _draw_onsets(axes: Axes, found: RobotWalks, uniform: xr.Dataset) -> None:
@@ -228,8 +219,8 @@ def _draw_onsets(axes: Axes, found: RobotWalks, uniform: xr.Dataset) -> None:
     axes.legend(loc="upper left")
 
 
-def _draw_durations(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_DURATIONS, narrow)
+@style.in_layouts(style.Layout("ABC", 3.6), style.Layout("A;B;C", 9.6))
+def _draw_durations(axes: style.Mosaic, data: xr.Dataset) -> None:
     times = data.duration.values
     axes["A"].axhspan(printed.ONSET.band.low, printed.ONSET.band.high, color=style.PALE, zorder=0)
     shapes.errorbars(axes["A"], times, data.onset.values, data.onset_error.values, style.BLUE, "o", joined=True)
@@ -251,4 +242,3 @@ def _draw_durations(data: xr.Dataset, narrow: bool) -> Figure:
         each.set(ylim=(-4.0, 104.0) if letter == "C" else (0.0, top), xlim=(0.0, 1.05 * times.max()))
         shapes.finish(each, legend="upper right" if letter == "B" else None, xlabel="walks last (s)")
     axes["C"].legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 0.05), columnspacing=1.0, handlelength=1.5)
-    return figure
