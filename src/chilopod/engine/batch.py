@@ -116,12 +116,9 @@ class BatchWalk(Walk):
 
     def save(self) -> bytes:
         settings, arrays = self._saved()
-        settings |= {
-            "record": None if self._record is None else asdict(self._record),
-            "tolerance": self._tolerance,
-            "time": self._time,
-        }
-        arrays |= {"factors": self._factors}
+        record = None if self._record is None else asdict(self._record)
+        settings |= {"record": record, "tolerance": self._tolerance, "time": self._time}
+        arrays["factors"] = self._factors
         arrays |= {f"target_{name}": values for name, values in self._targets.state().items()}
         arrays |= {f"told_{name}": values for name, values in self._actuators.state().items()}
         return pack(self.traits, self._robots, settings, arrays)

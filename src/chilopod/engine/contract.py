@@ -36,17 +36,9 @@ class Status(Labelled):
 
 @dataclass(frozen=True)
 class Event:
-    """An instant of every gait cycle at which a controller is called.
-
-    Attributes
-    ----------
-    name
-        Name by which the controller recognizes the event.
-    phase
-        Time since the start of the cycle over its period, in [0, 1).
-    window
-        Time available for the action, s.
-    """
+    """An instant of every gait cycle at which a controller is called: a name by which the controller recognizes it, its
+    phase, the time since the start of the cycle over its period, in [0, 1), and the window, which is the time available
+    for the action, s."""
 
     name: str
     phase: float
@@ -154,30 +146,17 @@ class Walk(Protocol):
     def pose(self) -> Array:
         """Poses of the robots now: x and y of the centre of module 1, m, and its heading, rad, up to whole turns.
 
-        Referees and displays use them; controllers receive only :meth:`observe`.
-
-        Returns
-        -------
-        Shape (robots, 3); NaN for robots that no longer walk.
+        Shape (robots, 3); NaN for robots that no longer walk. Referees and displays use them; controllers receive only
+        :meth:`observe`.
         """
 
     def aim(self, target: ArrayLike) -> None:
-        """Move the targets of the robots from now on. The motion of the robots does not change.
-
-        Parameters
-        ----------
-        target
-            Positions on the floor, m, shape (robots, 2) or (2,); a row of NaN removes the target of a robot.
-        """
+        """Move the targets of the robots from now on to positions on the floor, m, shape (robots, 2) or (2,); a row of
+        NaN removes the target of a robot. The motion of the robots does not change."""
 
     def halt(self, which: NDArray[np.bool_]) -> None:
-        """Stop some robots finally, with ``HALTED``; the results of the others do not change.
-
-        Parameters
-        ----------
-        which
-            Mask of the robots, shape (robots,). Robots that no longer walk keep their status.
-        """
+        """Stop some robots finally, by a mask of shape (robots,), with ``HALTED``; those that no longer walk keep their
+        status, and the results of the others do not change."""
 
     def states(self) -> Array:
         """States of the robots now, for ``initial`` of :meth:`chilopod.engine.Engine.start` or :meth:`restart`.
@@ -311,28 +290,13 @@ class Engine(Protocol):
         walk."""
 
     def initial_states(
-        self,
-        robot: Robot,
-        joint_angles: ArrayLike = 0.0,
-        heading: ArrayLike = 0.0,
-        position: ArrayLike = (0.0, 0.0),
+        self, robot: Robot, joint_angles: ArrayLike = 0.0, heading: ArrayLike = 0.0, position: ArrayLike = (0.0, 0.0)
     ) -> Array:
-        """States of robots that are about to walk.
+        """States of robots that are about to walk, for ``initial`` of :meth:`start`, shape (robots, n), with n the
+        engine's affair.
 
-        Parameters
-        ----------
-        robot
-            The robot.
-        joint_angles
-            rad, shape (N-1,) or (robots, N-1).
-        heading
-            Heading of module 1, rad, a number or shape (robots,).
-        position
-            Position of its centre, m, shape (2,) or (robots, 2).
-
-        Returns
-        -------
-        For ``initial`` of :meth:`start`, shape (robots, n), with n the engine's affair.
+        Joint angles are in rad, shape (N-1,) or (robots, N-1); the heading of module 1 in rad, a number or shape
+        (robots,), and the position of its centre in m, shape (2,) or (robots, 2).
         """
 
     def start(

@@ -11,16 +11,10 @@ from chilopod.frozen import Array
 
 
 class Ramps:
-    """Values that move to their setpoints at constant rates, independently.
+    """Values of any shape that move from a start to their setpoints at constant rates, independently; with ``keep`` the
+    setpoints are logged, for :meth:`over`.
 
     A repeated setpoint does not restart the ramp of a value, which then arrives no later than the new command demands.
-
-    Parameters
-    ----------
-    start
-        Values before any command, any shape.
-    keep
-        True to log the setpoints, for :meth:`over`.
     """
 
     def __init__(self, start: Array, keep: bool = False) -> None:
@@ -38,8 +32,7 @@ class Ramps:
         """Move to ``goal`` (NaN: unchanged), from a time on and within a duration, both in any unit."""
         changed = ~np.isnan(goal) & ((goal != self.goal) | (now + within < self._ramps[3]))
         if changed.any():
-            begun = np.empty_like(self._ramps)
-            begun[0], begun[1], begun[2], begun[3] = _at(self._ramps, now), goal, now, now + within
+            begun = np.broadcast_arrays(_at(self._ramps, now), goal, now, now + within)
             self._ramps = np.where(changed, begun, self._ramps)
             if self._history is not None:
                 self._history.append((now, self._ramps))

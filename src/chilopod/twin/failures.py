@@ -40,8 +40,8 @@ def failures(
         quiet = (np.abs(rates).max(2) < _FASTEST) & (np.abs(positions).max(2) < _FARTHEST)
         straight, standing = np.abs(bends).max(2) <= _MOST_BENT, upright > _UPRIGHT
     found = {}
+    signs = ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (standing, Status.FALLEN))
     for row in range(len(positions)):
-        signs = ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (standing, Status.FALLEN))
         bad = [(int(np.argmin(good[row])), status) for good, status in signs if not good[row].all()]
         if bad:
             found[row] = min(bad, key=itemgetter(0))
@@ -52,6 +52,6 @@ def failures(
 
 def _stopped(positions: Array, rates: Array, before: tuple[Array, Array]) -> int:
     """First step from which on the state only repeats, up to the end."""
-    places, speeds = np.vstack([before[0], positions]), np.vstack([before[1], rates])
-    moved = (np.diff(places, axis=0) != 0.0).any(axis=1) | (np.diff(speeds, axis=0) != 0.0).any(axis=1)
+    states = np.vstack([np.hstack(before), np.hstack([positions, rates])])
+    moved = (np.diff(states, axis=0) != 0.0).any(axis=1)
     return int(np.flatnonzero(moved)[-1]) + 1 if moved.any() else 0
