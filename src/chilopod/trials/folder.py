@@ -18,7 +18,7 @@ from chilopod.errors import OutputError, ParameterError
 from chilopod.netcdf import UnsoundError
 from chilopod.progress import Progress, silent
 from chilopod.trials.claims import nobody_in
-from chilopod.trials.store import Header, read_header
+from chilopod.trials.store import read_header
 from chilopod.trials.trial import digest_of, versions_of
 
 _TRIAL = re.compile(r".+-[0-9a-f]{20}\.nc")
@@ -53,7 +53,7 @@ class Kept(NamedTuple):
 
 def contents(folder: Path) -> Contents:
     """Return the names in a folder, in order. Raises ParameterError if the folder is missing or cannot be read."""
-    trials, aside, unfinished, foreign = list[Path](), list[Path](), list[Path](), list[Path]()
+    trials, aside, unfinished, foreign = found = [list[Path]() for _ in range(4)]
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
@@ -67,7 +67,7 @@ def contents(folder: Path) -> Contents:
                 paths.append(folder / entry.name)
     except OSError as error:
         raise ParameterError(f"must be a trial folder ({error.strerror})", field="folder", value=str(folder)) from None
-    return Contents(*(tuple(sorted(each)) for each in (trials, aside, unfinished, foreign)))
+    return Contents(*(tuple(sorted(each)) for each in found))
 
 
 def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
@@ -146,7 +146,7 @@ def groups(trials: Sequence[Kept]) -> list[Group]:
 
 
 def _looked_at(
-    paths: Sequence[Path], header_of: Callable[[Path], Header], progress: Progress
+    paths: Sequence[Path], header_of: Callable[[Path], tuple[dict[str, str], int]], progress: Progress
 ) -> tuple[list[Kept], Wrong]:
     found: list[Kept] = []
     wrong: Wrong = []
@@ -155,7 +155,7 @@ def _looked_at(
             progress(index / len(paths), f"{index} of {len(paths)} trials")
         with suppress(FileNotFoundError):  # another process was faster
             try:
-                found.append(_kept(path, header_of(path)))
+                found.append(_kept(path, *header_of(path)))
             except UnsoundError as error:
                 wrong.append((path, str(error)))
     if paths:
@@ -163,20 +163,19 @@ def _looked_at(
     return found, wrong
 
 
-def _kept(path: Path, header: Header) -> Kept:
-    text = header.attributes.get("trial", "")
+def _kept(path: Path, attributes: dict[str, str], size: int) -> Kept:
+    text = attributes.get("trial", "")
     digest = digest_of(text)
     if not path.stem.endswith(f"-{digest}"):
-        raise UnsoundError(
-            f"holds another trial, whose name ends in {digest}.nc" if text else "is not the record of a trial"
-        )
+        other = f"holds another trial, whose name ends in {digest}.nc"
+        raise UnsoundError(other if text else "is not the record of a trial")
     try:
         settings = json.loads(text)
         # TOML begins with what stands in no section.
-        robot = tomllib.loads(header.attributes["robot"].partition("\n[")[0])["name"]
+        robot = tomllib.loads(attributes["robot"].partition("\n[")[0])["name"]
         ours = settings["engine"] in ENGINES
         here = versions_of(settings["engine"] if ours else ENGINES[0])
         current = all(settings.get(name) == here[name] for name in here if ours or name != "engine_version")
     except (LookupError, TypeError, ValueError, AttributeError):
         raise UnsoundError("is damaged or was edited") from None
-    return Kept(path, header.size, robot, settings, current)
+    return Kept(path, size, robot, settings, current)

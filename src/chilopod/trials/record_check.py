@@ -65,11 +65,8 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     if found.shape != events.shape or not np.all(np.abs(found - events) <= _NEAR):
         return f"{found.size} commands instead of {events.size}, or at other times"
     sizes = {name: len(values) for name, values in coords.items()} | {"time": times.size, "event": events.size}
-    attributes = {
-        "engine": engine_named(first.engine).traits.name,
-        "robot": file_text(first.robot),
-        "duration": walk.time,
-    }
+    engine = engine_named(first.engine).traits.name
+    attributes = {"engine": engine, "robot": file_text(first.robot), "duration": walk.time}
     for name, value in attributes.items():
         if data.attrs.get(name) != value:
             return f"its attribute {name} is {str(data.attrs.get(name))[:40]!r}, not {str(value)[:40]!r}"
