@@ -43,16 +43,9 @@ class Actuators:
     """Springs, leg yaw and torques of a batch of robots under commands; with ``keep`` the setpoints are logged, for
     :meth:`add_to`.
 
-    Attributes
-    ----------
-    joint_torque
-        Commanded joint torque, N*m, shape (robots, N-1).
-    profile
-        Stiffness over time since the last command: the rows named above, shape (7, robots, N-1).
-    lag
-        Lag of the springs' actuators, s, shape (robots, N-1).
-    driven
-        True if a robot's springs or torques were ever commanded, shape (robots,).
+    ``joint_torque`` is the commanded one, N*m, shape (robots, N-1); ``profile`` the stiffness over time since the last
+    command, the rows named above, shape (7, robots, N-1); ``lag`` that of the springs' actuators, s, shape (robots,
+    N-1); and ``driven``, shape (robots,), is True if a robot's springs or torques were ever commanded.
     """
 
     def __init__(self, robots: Sequence[Robot], keep: bool = True) -> None:

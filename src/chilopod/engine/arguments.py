@@ -15,6 +15,9 @@ from chilopod.record import LARGEST, LONGEST, Recording
 from chilopod.robot import Robot
 from chilopod.units.quantity import as_number as as_number  # for all engines
 
+Arguments = Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]]
+"""Arguments by name, each with the shape of one row."""
+
 BEGINNING = 1e-9
 """Tolerance of a time at the beginning of a gait cycle, relative to the cycle: rounding of whole multiples of the
 period."""
@@ -123,9 +126,7 @@ def _check_size(name: str, array: Array, largest: float = LARGEST) -> None:
 
 
 def rows_of(
-    robots: Sequence[Robot],
-    arguments: Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]],
-    seeds: Sequence[int] | None = None,
+    robots: Sequence[Robot], arguments: Arguments, seeds: Sequence[int] | None = None
 ) -> tuple[int, dict[str, Array | None]]:
     """Arguments of ``start``: the number of walks, and copies of the arrays, with one row a walk; None for an argument
     that was not given.
@@ -157,12 +158,7 @@ def rows_of(
 
 
 def rows_anew(
-    which: object,
-    robots: Sequence[Robot],
-    time: float,
-    record: Recording | None,
-    arguments: Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]],
-    seeds: object = None,
+    which: object, robots: Sequence[Robot], time: float, record: Recording | None, arguments: Arguments, seeds: object
 ) -> tuple[NDArray[np.bool_], dict[str, Array | None]]:
     """Arguments of ``restart``, ``arguments`` as in :func:`rows_of`, of a walk with these robots, time and record: the
     mask of the robots, and arrays with one row for each restarted robot; None for an argument that was not given, or if

@@ -84,18 +84,12 @@ def with_end(data: xr.Dataset, walk: Walk, record: Recording) -> xr.Dataset:
 
 
 class BatchWalk(Walk):
-    """Robots, actuators, targets and time of a walk; a sample of its record has ``numbers`` numbers."""
+    """Robots, actuators, targets and time of a walk; a sample of its record has ``size`` numbers."""
 
     def __init__(
-        self,
-        traits: Traits,
-        begun: Beginning,
-        record: Recording | None,
-        tolerance: float,
-        expected: float,
-        numbers: int,
+        self, traits: Traits, begun: Beginning, record: Recording | None, tolerance: float, expected: float, size: int
     ) -> None:
-        check_size(record, expected, numbers)
+        check_size(record, expected, size)
         keep = record is not None
         self.traits = traits
         self._robots, self._factors = tuple(begun.robots), begun.factors

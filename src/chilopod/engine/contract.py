@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+Marks = NDArray[np.bool_]
+"""Mask of the robots of a batch, shape (robots,)."""
+
+
 class Status(Labelled):
     """Status of a walk; each member's ``sentence`` explains it."""
 
@@ -53,11 +57,9 @@ class Observation:
     ----------
     time
         Time of the observation, s.
-    bearing
-        Direction of the target relative to the heading of module 1, left positive, rad in [-pi, pi); NaN where it is
-        not seen. Shape (robots,).
-    distance
-        Distance of the target from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
+    bearing, distance
+        Direction of the target relative to the heading of module 1, left positive, rad in [-pi, pi), and its distance
+        from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
     joint_angles
         Angles of the yaw joints, heading of the module behind minus heading of the module before (positive: bent to the
         right), rad, shape (robots, N-1); NaN for a robot that no longer walks.
@@ -154,7 +156,7 @@ class Walk(Protocol):
         """Move the targets of the robots from now on to positions on the floor, m, shape (robots, 2) or (2,); a row of
         NaN removes the target of a robot. The motion of the robots does not change."""
 
-    def halt(self, which: NDArray[np.bool_]) -> None:
+    def halt(self, which: Marks) -> None:
         """Stop some robots finally, by a mask of shape (robots,), with ``HALTED``; those that no longer walk keep their
         status, and the results of the others do not change."""
 
@@ -168,11 +170,7 @@ class Walk(Protocol):
         """
 
     def restart(
-        self,
-        which: NDArray[np.bool_],
-        initial: ArrayLike,
-        friction: ArrayLike | None = None,
-        seeds: Sequence[int] | None = None,
+        self, which: Marks, initial: ArrayLike, friction: ArrayLike | None = None, seeds: Sequence[int] | None = None
     ) -> None:
         """Start some robots again, at the beginning of a gait cycle; the results of the others do not change.
 
@@ -241,22 +239,17 @@ class Traits:
 
     Attributes
     ----------
-    name
-        Name of the engine on the command line and in records.
-    sentence
-        Description of the engine in a sentence.
+    name, sentence
+        Name of the engine on the command line and in records, and its description.
     exact
         True if its walks are those of the planar theory (:mod:`chilopod.analysis`), so that branches hold for them.
-    noisy
-        True if its sensors have noise of their own, drawn from ``seeds``.
-    poses
-        True if it can record the positions of all joints, to be drawn.
+    noisy, poses
+        True if its sensors have noise of their own, drawn from ``seeds``; if it can record the positions of all joints.
     threads
         True if walks of several threads run at the same time, because the interpreter's lock is free meanwhile.
-    robots_per_core
-        Number of robots that one core should walk at a time: a few seconds of work.
-    walks_per_round
-        Number of walks that a search may spend on one round of trials.
+    robots_per_core, walks_per_round
+        Number of robots that one core should walk at a time, a few seconds of work, and number of walks that a search
+        may spend on one round of trials.
     duration_ratio
         Ratio of a task's duration to its duration at the speed of the straight walk without slip.
     version

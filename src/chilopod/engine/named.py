@@ -142,9 +142,9 @@ def foreign(kind: type[ChilopodError], problem: str, *passed: type[ChilopodError
     that are ``passed`` on."""
     try:
         yield
-    except (KeyboardInterrupt, *passed):
-        raise
     except BaseException as error:
+        if isinstance(error, (KeyboardInterrupt, *passed)):
+            raise
         raise kind(f"{problem} {in_words(error)}", **parts) from error
 
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Row = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
+Source = str | Path | Robot | None
 
 _PRESETS = {"planar": "aoi2022-planar", "twin": "aoi2022"}
 _RENDER_MODES = ("rgb_array",)
@@ -66,7 +67,7 @@ class RobotVectorEnv(_Pictured, VectorEnv[Row, Row, NDArray[Any]]):
         self,
         num_envs: int = 1,
         *,
-        robot: str | Path | Robot | None = None,
+        robot: Source = None,
         engine: str = "planar",
         render_mode: str | None = None,
         **named: Any,
@@ -113,12 +114,7 @@ class RobotEnv(_Pictured, gymnasium.Env[Row, Row]):
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS}  # noqa: RUF012
 
     def __init__(
-        self,
-        *,
-        robot: str | Path | Robot | None = None,
-        engine: str = "planar",
-        render_mode: str | None = None,
-        **named: Any,
+        self, *, robot: Source = None, engine: str = "planar", render_mode: str | None = None, **named: Any
     ) -> None:
         self.render_mode = render_mode
         self.episodes = _episodes(1, robot, engine, render_mode, named)
@@ -146,9 +142,7 @@ class RobotEnv(_Pictured, gymnasium.Env[Row, Row]):
         return next(iter(self._drawn()), None)
 
 
-def _episodes(
-    count: int, robot: str | Path | Robot | None, engine: str, render_mode: str | None, named: dict[str, Any]
-) -> Episodes:
+def _episodes(count: int, robot: Source, engine: str, render_mode: str | None, named: dict[str, Any]) -> Episodes:
     known, allowed = render_mode in (None, *_RENDER_MODES), ", ".join(_RENDER_MODES)
     require(known, "must be one of the render modes", "render_mode", render_mode, allowed)
     engine_named(engine)

@@ -17,12 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod import memory
 from chilopod.engine import Observation, Walk, engine_named
 from chilopod.engine.arguments import require
+from chilopod.engine.contract import Marks
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.frozen import Array
 from chilopod.gym.actions import Actions
 from chilopod.gym.sight import Sight
-from chilopod.gym.tasks import Look, Marks, Task, task_of
+from chilopod.gym.tasks import Look, Task, task_of
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
 from chilopod.steering import CourseReferee, Judged, Verdict

@@ -7,16 +7,14 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.engine.arguments import as_number, require
+from chilopod.engine.contract import Marks
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.flows.arguments import checked_count
 from chilopod.frozen import Array
 from chilopod.steering import Course, Goal, Judged, Target, random_course
 from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
-
-Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

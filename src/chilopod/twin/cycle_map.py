@@ -40,16 +40,11 @@ class CycleMap:
     so the map is a function of the state. ``names`` and ``units`` are those of the coordinates, ``period`` is a
     cycle in s, and ``control`` are the controls before every step, which are exact for a robot's :func:`walk_cycle`.
 
-    Parameters
-    ----------
-    model
-        Model, which is copied. Joints are hinges and slides, beside one free joint in front; gravity is vertical, and
-        actuators and sensors have no states and no delays. Others are refused by a ParameterError.
-    control
-        Controls before every step of a cycle, shape (steps, nu).
-    travel
-        Names of joints along which the world looks the same, such as the slide ahead of a planar walker. It must also
-        look the same from wherever a free body stands; :meth:`depends_on_place` tells.
+    The model is copied. Its joints are hinges and slides, beside one free joint in front; gravity is vertical, and
+    actuators and sensors have no states and no delays. Others are refused by a ParameterError. Controls before every
+    step of a cycle have the shape (steps, nu). ``travel`` names joints along which the world looks the same, such as
+    the slide ahead of a planar walker. It must also look the same from wherever a free body stands;
+    :meth:`depends_on_place` tells.
     """
 
     def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: tuple[str, ...] = ()) -> None:

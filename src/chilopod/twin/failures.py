@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.engine import Status
+from chilopod.engine.contract import Marks
 from chilopod.frozen import Array
 
 _FASTEST = 100.0  # m/s and rad/s: a robot that moves faster than that has blown up
@@ -17,11 +18,7 @@ _MOST_BENT = 0.5 * np.pi  # rad, of a yaw joint
 
 
 def failures(
-    positions: Array,
-    rates: Array,
-    before: tuple[Array, Array],
-    yaw_positions: NDArray[np.intp],
-    warned: NDArray[np.bool_],
+    positions: Array, rates: Array, before: tuple[Array, Array], yaw_positions: NDArray[np.intp], warned: Marks
 ) -> dict[int, tuple[int, Status]]:
     """Failures of the robots of a batch in some steps: for each robot the first step after its walk, and its status.
 

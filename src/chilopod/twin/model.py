@@ -55,18 +55,15 @@ class TwinModel:
 
     Attributes
     ----------
-    robot, twin
-        As given.
     model
         Compiled model, not to be changed.
     yaw_joints, yaw_positions, yaw_rates
         Numbers of the yaw joints, front to rear, and their indices in ``qpos`` and ``qvel``, (N-1,).
     feet
         Geom of every foot, (N, 2).
-    leg_positions, leg_controls
-        Indices of hip and knee in ``qpos``, and of their servos in ``ctrl``, (N, 2, 2).
-    leg_yaw_positions, leg_yaw_controls
-        Indices of the leg yaw joints of module 1, likewise, (2,).
+    leg_positions, leg_controls, leg_yaw_positions, leg_yaw_controls
+        Indices of hip and knee in ``qpos``, and of their servos in ``ctrl``, (N, 2, 2); and likewise of the leg yaw
+        joints of module 1, (2,).
     spring_controls
         Indices in ``ctrl`` of the actuators that change the springs, (N-1,), in N*m/rad above the spring's own
         stiffness; empty without such actuators.

@@ -25,7 +25,6 @@ traits = Traits(
     noisy=True,
     poses=True,
     robots_per_core=4,
-    walks_per_round=8,
     duration_ratio=2.8,
     version=f"MuJoCo {mujoco.__version__}",
 )
@@ -73,12 +72,11 @@ def start(
     edit: Edit | None = None,
     traits: Traits = traits,
 ) -> TwinWalk:
-    """Start walks on the floor, see :class:`chilopod.engine.Engine`.
+    """Start walks on the floor, see :class:`chilopod.engine.Engine`, of robots that may differ only in the numbers of
+    their springs.
 
     Parameters
     ----------
-    robots, friction, record, expected
-        See :class:`chilopod.engine.Engine`. Robots may differ only in the numbers of their springs.
     initial
         From :func:`initial_states`, shape (walks, nq) or (nq,), or from ``states`` of a walk, (walks, nq + nv).
     target

@@ -18,6 +18,7 @@ from chilopod.cores import cores
 from chilopod.engine import Command, Observation, Ramps, Status, Traits, one_thread
 from chilopod.engine.arguments import as_array, as_marks, as_seeds, check_time, require, rows_anew
 from chilopod.engine.batch import BatchWalk, Beginning
+from chilopod.engine.contract import Marks
 from chilopod.engine.saved import part
 from chilopod.frozen import Array
 from chilopod.record import Recording, Samples, check_size, quantity, walk_record
@@ -141,7 +142,7 @@ class TwinWalk(BatchWalk):
         self._targets.move(self._time, target)
         self._put_poles()
 
-    def halt(self, which: NDArray[np.bool_]) -> None:
+    def halt(self, which: Marks) -> None:
         self._status[as_marks("which", which, len(self._robots)) & ~self._gone] = Status.HALTED
 
     def states(self) -> Array:
@@ -150,17 +151,11 @@ class TwinWalk(BatchWalk):
         return states
 
     def restart(
-        self,
-        which: NDArray[np.bool_],
-        initial: ArrayLike,
-        friction: ArrayLike | None = None,
-        seeds: Sequence[int] | None = None,
+        self, which: Marks, initial: ArrayLike, friction: ArrayLike | None = None, seeds: Sequence[int] | None = None
     ) -> None:
         """See :class:`chilopod.engine.Walk`; the times of the scans do not change."""
-        arguments = {
-            "initial": (initial, (state_size(self._plan, initial),)),
-            "friction": (friction, self._factors.shape[1:]),
-        }
+        size = (state_size(self._plan, initial),)
+        arguments = {"initial": (initial, size), "friction": (friction, self._factors.shape[1:])}
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
         states, ids = rows["initial"], np.flatnonzero(marked)
         noisy = seeds is None or self._seeds is not None
@@ -212,11 +207,8 @@ class TwinWalk(BatchWalk):
         return partial(TwinWalk, traits=self.traits, threads=0, edit=self._edit)
 
     def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        settings = {
-            "seeds": None if self._seeds is None else self._seeds.tolist(),
-            "tick": self._tick,
-            "status": [each.name for each in self._status],
-        }
+        seeds = None if self._seeds is None else self._seeds.tolist()
+        settings = {"seeds": seeds, "tick": self._tick, "status": [each.name for each in self._status]}
         return settings, {
             "states": self._batch.bind("qpos"),
             **{f"state_{name}": self._batch.bind(name) for name in _STATE},
@@ -291,7 +283,7 @@ class TwinWalk(BatchWalk):
         self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * self._factors
 
     @property
-    def _gone(self) -> NDArray[np.bool_]:
+    def _gone(self) -> Marks:
         """Mask of the robots that no longer walk."""
         return np.asarray(self._status != Status.WALKED, dtype=np.bool_)
 
