@@ -172,21 +172,15 @@ class Walk(Protocol):
     def restart(
         self, which: Marks, initial: ArrayLike, friction: ArrayLike | None = None, seeds: Sequence[int] | None = None
     ) -> None:
-        """Start some robots again, at the beginning of a gait cycle; the results of the others do not change.
+        """Start some robots again, by a mask of shape (robots,), at the beginning of a gait cycle; the results of the
+        others do not change.
 
         Whatever their status, they walk as if freshly started, up to the rounding of times: springs of the file, legs
         straight, no torque. Their targets stay in place. A walk with a record cannot be restarted.
 
-        Parameters
-        ----------
-        which
-            Mask of the robots, shape (robots,).
-        initial
-            States as for :meth:`chilopod.engine.Engine.start`, one row for all of them or one each.
-        friction
-            Factors as for :meth:`chilopod.engine.Engine.start`; None keeps those of the walk.
-        seeds
-            Seeds of the noise of their sensors from now on, one each; None continues the noise.
+        States and factors of friction are as for :meth:`chilopod.engine.Engine.start`, one row for all of them or one
+        each; without factors those of the walk remain. Seeds, one each, are of the noise of their sensors from now on;
+        without them the noise continues.
         """
 
     def command(self, command: Command) -> None:

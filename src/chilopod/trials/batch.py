@@ -149,7 +149,7 @@ def _steered(
         raise AnalysisError(problem, field=f"engine {first.engine}")
     noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
-    referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
+    referee = CourseReferee(courses, first.robot.gait, missed) if courses else None
     steer(walk, until, first.controller, bearing_noise=noise, referee=referee, progress=progress, heard=heard)
     return walk, drawn, referee
 

@@ -6,10 +6,9 @@ import json
 import os
 import re
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -72,12 +71,12 @@ def contents(folder: Path) -> Contents:
 
 def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
     """Return the headers of readable files, and the faults of the others."""
-    return _looked_at(paths, read_header, progress)
+    return _looked_at(paths, False, progress)
 
 
 def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
     """Return the same for files that are complete to the last byte and named after their trial."""
-    return _looked_at(paths, partial(read_header, whole=True), progress)
+    return _looked_at(paths, True, progress)
 
 
 def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], Wrong]:
@@ -145,9 +144,7 @@ def groups(trials: Sequence[Kept]) -> list[Group]:
     return sorted(found, key=lambda group: (group.robot, group.engine, repr(group)))
 
 
-def _looked_at(
-    paths: Sequence[Path], header_of: Callable[[Path], tuple[dict[str, str], int]], progress: Progress
-) -> tuple[list[Kept], Wrong]:
+def _looked_at(paths: Sequence[Path], whole: bool, progress: Progress) -> tuple[list[Kept], Wrong]:
     found: list[Kept] = []
     wrong: Wrong = []
     for index, path in enumerate(paths):
@@ -155,7 +152,7 @@ def _looked_at(
             progress(index / len(paths), f"{index} of {len(paths)} trials")
         with suppress(FileNotFoundError):  # another process was faster
             try:
-                found.append(_kept(path, *header_of(path)))
+                found.append(_kept(path, *read_header(path, whole=whole)))
             except UnsoundError as error:
                 wrong.append((path, str(error)))
     if paths:

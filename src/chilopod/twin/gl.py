@@ -69,8 +69,9 @@ def find() -> Found:
         return Found(None, missing=f"drawing is switched off by MUJOCO_GL={wish}", mend="unset MUJOCO_GL")
     if wish not in _ANY and wanted not in known:
         return Found(None, missing=f"MUJOCO_GL={one_line(wish)} is no backend here", mend="unset MUJOCO_GL")
-    faults = {}
-    for name in _candidates(known) if wish in _ANY else (wanted,):
+    windows = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or "egl" not in known
+    faults, candidates = {}, (name for name in known if windows or name != "glfw")
+    for name in candidates if wish in _ANY else (wanted,):
         renderer, fault = _tried(name)
         if not fault:
             return Found(name, renderer)
@@ -114,11 +115,6 @@ def context(width: int, height: int) -> Iterator[None]:
         yield
     finally:
         made.free()
-
-
-def _candidates(known: tuple[str, ...]) -> tuple[str, ...]:
-    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    return known if display or "egl" not in known else tuple(name for name in known if name != "glfw")
 
 
 def _tried(name: str) -> tuple[str, str]:

@@ -57,10 +57,6 @@ class Sampling:
         near = int(step * in_a_step) + np.arange(-2, 4 + int(in_a_step))
         return int(near[self.steps(near) <= step][-1]) + 1
 
-    def between(self, after: int, up_to: int) -> NDArray[np.intp]:
-        """Numbers of the samples after one step and up to another."""
-        return np.arange(self.count(after), self.count(up_to))
-
 
 @one_thread
 class TwinWalk(BatchWalk):
@@ -269,7 +265,6 @@ class TwinWalk(BatchWalk):
         return data
 
     # -- inside
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _put(self, ids: NDArray[np.intp], states: Array) -> None:
         """Set the states of robots; at rest, if states have no velocities."""
@@ -315,7 +310,7 @@ class TwinWalk(BatchWalk):
         before = batch.bind("qpos")[walking], batch.bind("qvel")[walking]
         out = batch.rollout(count, self._controls(tick), record=list(kept), ids=walking)
         self._scanner.passed(self._tick, tick, out["qpos"][:, per_tick - 1 :: per_tick, :7], walking)
-        samples = self._sampling.between(first, first + count)
+        samples = np.arange(self._sampling.count(first), self._sampling.count(first + count))
         at = self._sampling.steps(samples) - first - 1
         for name, store in kept.items():
             if samples.size:
