@@ -55,13 +55,10 @@ def begin(
     arguments = {"initial": (initial, (size,)), "friction": (friction, feet), "target": (target, (2,))}
     count, rows = rows_of(robots, arguments, noise)
     states, factors = rows["initial"], rows["friction"]
-    return Beginning(
-        robots * count if len(robots) == 1 else robots,
-        np.tile(standing, (count, 1)) if states is None else states,
-        np.ones((count, *feet)) if factors is None else factors,
-        rows["target"],
-        None if noise is None else noise * (count if len(noise) == 1 else 1),
-    )
+    states = np.tile(standing, (count, 1)) if states is None else states
+    factors = np.ones((count, *feet)) if factors is None else factors
+    noise = noise * count if noise and len(noise) == 1 else noise
+    return Beginning(robots * count if len(robots) == 1 else robots, states, factors, rows["target"], noise)
 
 
 def resumed(traits: Traits, saved: bytes, make: Callable[[Beginning, Recording | None, float], _Kind]) -> _Kind:

@@ -127,17 +127,14 @@ def steer(
 
     Parameters
     ----------
-    walk, until
-        Walk, changed in place, and the time to advance it to, s.
-    controller
-        Controller; None keeps the last setpoints.
+    walk, until, controller
+        Walk, changed in place, time to advance it to, s, and its controller; None keeps the last setpoints.
     bearing_noise
         Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events from the start of the walk.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
-    heard
-        Function of each event, of a copy of what the controller was shown, and of its command.
+    progress, heard
+        Function of the fraction done (0 to 1) and a few words; function of each event, of a copy of what the controller
+        was shown, and of its command.
     """
     gait, begun = walk.robots[0].gait, walk.time
     until = check_time(until, begun)

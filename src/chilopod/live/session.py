@@ -180,12 +180,10 @@ class Session:
             self.settings = replace(self.settings, recording=False)
             self._messages.append(f"recording has ended: there is room for no more than the {self._recorded} so far")
         self._written = self._has_record = self.settings.recording
-        self._walk: Walk = self._engine.start(
-            [robot],
-            initial=states,
-            seeds=[self.settings.seed] if self._engine.traits.noisy else None,
-            record=Recording(_RATE, poses=self._engine.traits.poses) if self._has_record else None,
-        )
+        traits = self._engine.traits
+        seeds = [self.settings.seed] if traits.noisy else None
+        record = Recording(_RATE, poses=traits.poses) if self._has_record else None
+        self._walk: Walk = self._engine.start([robot], initial=states, seeds=seeds, record=record)
         self._look_next = 1
 
     def _go(self, until: float) -> None:
