@@ -10,7 +10,7 @@ SOURCES = Path(chilopod.__file__).parent
 ROOT = Path(__file__).resolve().parent.parent
 HEAD = re.compile(r"(Of|That|Whose|What|Whether|Which)\b")
 FRAGMENT = re.compile(r"(Of|That|Whose|What|Whether|Which|Where|When|Why|Who|How)\b")
-ERRORS = re.compile(r"(Parameter|Analysis|RobotFile|Output|Thread|Unit|Cluster|Unsound|Extra)Error")
+ERRORS = re.compile(r"(Parameter|Analysis|RobotFile|Output|Thread|Unit|Cluster|Unsound|Extra)Error|require")
 WORDS = re.compile(r"\b(problem|allowed|reason)\b")
 RIDDLE = re.compile(
     r" (is|are) (no|none)\b| there (is|are) (no|none)\b| says otherwise| has none\b|^ (That|What|Who|Which)\b"

@@ -237,6 +237,12 @@ def walk_record(
     return xr.Dataset({name: (over, each, {"units": unit}) for (name, (over, unit, _)), each in named}, coords=coords)
 
 
+def quantity(name: str, values: Any) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+    """Variable of a record with one of the names of :data:`QUANTITIES`, without time where the values have none."""
+    over, unit, _ = QUANTITIES[name]
+    return over[-values.ndim :], values, {"units": unit}
+
+
 def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None) -> None:
     """Add status and target to a record, and set the samples after a robot's failure to NaN.
 

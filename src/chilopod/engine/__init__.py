@@ -6,13 +6,12 @@ positions of targets, ``loop`` lets a controller steer a walk, ``named`` finds e
 ``one_thread`` keeps a walk to one thread at a time, and ``check`` tests an engine against the contract.
 """
 
-from chilopod.engine.actuators import Actuators
+from chilopod.engine.actuators import Actuators, Ramps
 from chilopod.engine.check import check_engine
 from chilopod.engine.contract import Command, Controller, Engine, Event, HasFootCreep, Observation, Status, Traits, Walk
 from chilopod.engine.loop import Referee, Spent, event_times, steer, watched
 from chilopod.engine.named import ENGINES, controller_named, engine_named
 from chilopod.engine.one_thread import one_thread
-from chilopod.engine.ramps import Ramps
 from chilopod.engine.targets import Targets
 from chilopod.frozen import Array
 

@@ -11,19 +11,18 @@ tau, tau k' = u - k::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine.arguments import as_array, as_number, beyond
+from chilopod.engine.arguments import as_array, as_number, beyond, require
 from chilopod.engine.contract import Command
-from chilopod.engine.ramps import Ramps
 from chilopod.engine.saved import part
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
-from chilopod.record import LARGEST, LONGEST
+from chilopod.record import LARGEST, LONGEST, quantity
 from chilopod.robot import Robot
 
 if TYPE_CHECKING:
@@ -39,26 +38,76 @@ _SAME_INSTANT = 1e-9  # s
 _SAME = 1e-9  # relative tolerance of the stiffness commanded to a spring that is not adjustable
 
 
+class Ramps:
+    """Values of any shape that move from a start to their setpoints at constant rates, independently; with ``keep`` the
+    setpoints are logged, for :meth:`over`.
+
+    A repeated setpoint does not restart the ramp of a value, which then arrives no later than the new command demands.
+    """
+
+    def __init__(self, start: Array, keep: bool = False) -> None:
+        begun = np.array(start, dtype=np.float64)
+        # Start and end of each ramp, and their times; never written into, only replaced.
+        self._ramps = np.stack([begun, begun, 0.0 * begun, 0.0 * begun])
+        self._history: list[tuple[float, Array]] | None = [(0.0, self._ramps)] if keep else None
+
+    @property
+    def goal(self) -> Array:
+        """Setpoint of the last command."""
+        return self._ramps[1]
+
+    def to(self, goal: Array, now: float, within: float) -> None:
+        """Move to ``goal`` (NaN: unchanged), from a time on and within a duration, both in any unit."""
+        changed = ~np.isnan(goal) & ((goal != self.goal) | (now + within < self._ramps[3]))
+        if changed.any():
+            begun = np.broadcast_arrays(_at(self._ramps, now), goal, now, now + within)
+            self._ramps = np.where(changed, begun, self._ramps)
+            if self._history is not None:
+                self._history.append((now, self._ramps))
+
+    def at(self, times: Array) -> Array:
+        """Values at times (T,) since the last command, shape (T, ...)."""
+        return _at(self._ramps, times.reshape(-1, *[1] * self.goal.ndim))
+
+    def restart(self, which: NDArray[np.bool_]) -> None:
+        """Set some values to 0 from now on, in place of their setpoints; only without a log (``keep``)."""
+        ramps = self._ramps.copy()
+        ramps[:, which] = 0.0
+        self._ramps = ramps
+
+    def over(self, times: Array) -> Array:
+        """Values at any rising times (T,), shape (T, ...); at the time of a command, the values before it."""
+        history = self._history or [(0.0, self._ramps)]
+        values = np.empty((len(times), *self.goal.shape))
+        ends = np.searchsorted(times, [when for when, _ in history[1:]] + [np.inf], side="right")
+        first = 0
+        for (_, ramps), last in zip(history, ends, strict=True):
+            if last > first:
+                values[first:last] = _at(ramps, times[first:last].reshape(-1, *[1] * self.goal.ndim))
+                first = last
+        return values
+
+    def state(self) -> dict[str, Array]:
+        """Complete state, for :meth:`restore`."""
+        if self._history is None:
+            return {"now": self._ramps}
+        history = np.array([each for _, each in self._history])
+        return {"now": self._ramps, "times": np.array([when for when, _ in self._history]), "history": history}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Take over the state of other ramps."""
+        self._ramps = state["now"]
+        if self._history is not None:
+            self._history = list(zip(state["times"].tolist(), state["history"], strict=True))
+
+
 class Actuators:
-    """Springs, leg yaw and torques of a batch of robots under commands.
+    """Springs, leg yaw and torques of a batch of robots under commands; with ``keep`` the setpoints are logged, for
+    :meth:`add_to`.
 
-    Parameters
-    ----------
-    robots
-        One a walk.
-    keep
-        True to log the setpoints, for :meth:`add_to`.
-
-    Attributes
-    ----------
-    joint_torque
-        Commanded joint torque, N*m, shape (robots, N-1).
-    profile
-        Stiffness over time since the last command: the rows named above, shape (7, robots, N-1).
-    lag
-        Lag of the springs' actuators, s, shape (robots, N-1).
-    driven
-        True if a robot's springs or torques were ever commanded, shape (robots,).
+    ``joint_torque`` is the commanded one, N*m, shape (robots, N-1); ``profile`` the stiffness over time since the last
+    command, the rows named above, shape (7, robots, N-1); ``lag`` that of the springs' actuators, s, shape (robots,
+    N-1); and ``driven``, shape (robots,), is True if a robot's springs or torques were ever commanded.
     """
 
     def __init__(self, robots: Sequence[Robot], keep: bool = True) -> None:
@@ -95,34 +144,20 @@ class Actuators:
         return bool(self._adjustable.any())
 
     def command(self, time: float, command: Command, walking: NDArray[np.bool_]) -> None:
-        """Follow a command from now on, for robots that still walk; an invalid command raises ParameterError and
-        changes nothing.
-
-        Parameters
-        ----------
-        time
-            Time of the command, s, not before the last one.
-        command
-            Command of each actuator.
-        walking
-            Shape (robots,).
-        """
-        if not isinstance(command, Command):
-            raise ParameterError("must be a chilopod.engine.Command", field="command", value=type(command).__name__)
+        """Follow a command from a time on, s, not before the last one, with the robots that still walk, mask of shape
+        (robots,); an invalid command raises ParameterError and changes nothing."""
+        known = isinstance(command, Command)
+        require(known, "must be a chilopod.engine.Command", "command", type(command).__name__)
         within = as_number("command.within", command.within)
-        if not 0.0 <= within <= LONGEST:
-            raise ParameterError(
-                "must be a duration in s", field="command.within", value=within, allowed=f"0 to {LONGEST:g} s"
-            )
+        allowed = f"0 to {LONGEST:g} s"
+        require(0.0 <= within <= LONGEST, "must be a duration in s", "command.within", within, allowed)
         within = within if within >= _SAME_INSTANT else 0.0
         yaw = self._rows("leg_yaw", command.leg_yaw, 2, walking)
         stiffness = self._rows("stiffness", command.stiffness, self.lag.shape[1], walking)
         torque = self._rows("joint_torque", command.joint_torque, self.lag.shape[1], walking)
-        if yaw is not None and ((np.abs(yaw) > _MOST_YAW) & walking[:, None]).any():
-            worst = float(np.abs(yaw[walking]).max())
-            raise ParameterError(
-                "must be at most a right angle", field="command.leg_yaw", value=worst, allowed="-pi/2 to pi/2 rad"
-            )
+        if yaw is not None:
+            worst, allowed = float(np.abs(yaw[walking]).max(initial=0.0)), "-pi/2 to pi/2 rad"
+            require(worst <= _MOST_YAW, "must be at most a right angle", "command.leg_yaw", worst, allowed)
         if stiffness is not None:
             self._check(stiffness, walking)
             self._soften(time, stiffness, walking, within)
@@ -133,9 +168,8 @@ class Actuators:
             self.joint_torque = np.where(walking[:, None], torque, self.joint_torque)
         if self._keep:
             wanted = np.full(self.lag.shape, np.nan) if stiffness is None else stiffness
-            when: dict[str, Any] = {"event": time, "within": within}
             what = {"command": self.leg_yaw, "command_stiffness": wanted, "command_torque": self.joint_torque}
-            self._log.append(when | what)
+            self._log.append({"event": time, "within": within, **what})
 
     def restart(self, which: NDArray[np.bool_]) -> None:
         """Reset some robots, shape (robots,), to the start; only without a log of setpoints."""
@@ -161,22 +195,11 @@ class Actuators:
 
     def add_to(self, data: xr.Dataset) -> None:
         """Add setpoints and springs to a record, in place; springs over time if any spring is adjustable."""
-        over = ("robot", "joint")
+        found = {name: self._logged(name) for name in (self._log[0] if self._log else ())}
         if not self.adjustable:
-            data["stiffness"] = (over, self._start.copy(), {"units": "N*m/rad"})
-        else:
-            data["stiffness"] = (("time", *over), self._stiffness_over(data.time.values), {"units": "N*m/rad"})
-        if not self._log:
-            return
-        data.coords["event"] = ("event", self._logged("event"), {"units": "s"})
-        found: dict[str, Any] = {
-            "within": ("event", self._logged("within"), {"units": "s"}),
-            "command": (("event", "robot", "side"), self._logged("command"), {"units": "rad"}),
-        }
-        if self.adjustable:
-            found["command_stiffness"] = (("event", *over), self._logged("command_stiffness"), {"units": "N*m/rad"})
-        found["command_torque"] = (("event", *over), self._logged("command_torque"), {"units": "N*m"})
-        data.update(found)
+            found.pop("command_stiffness", None)
+        found["stiffness"] = self._stiffness_over(data.time.values) if self.adjustable else self._start.copy()
+        data.update({name: quantity(name, values) for name, values in found.items()})
 
     def leg_yaw_over(self, times: Array) -> Array:
         """Leg yaw on its ramps at any rising times of the walk, rad, shape (times, robots, 2)."""
@@ -184,9 +207,7 @@ class Actuators:
 
     def leg_yaw_commanded(self, times: Array) -> Array:
         """Setpoint of leg yaw at any rising times of the walk, rad, shape (times, robots, 2)."""
-        setpoints = np.concatenate(
-            [np.zeros((1, *self.leg_yaw.shape)), self._logged("command").reshape(-1, *self.leg_yaw.shape)]
-        )
+        setpoints = np.array([np.zeros_like(self.leg_yaw), *(each["command"] for each in self._log)])
         return setpoints[np.searchsorted(self._logged("event"), times, side="left")]
 
     def state(self) -> dict[str, Array]:
@@ -210,36 +231,29 @@ class Actuators:
         self._log = [{name: values[i] for name, values in logged.items()} for i in range(count)]
 
     # -- inside
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _rows(self, name: str, value: ArrayLike | None, columns: int, walking: NDArray[np.bool_]) -> Array | None:
         if value is None:
             return None
         array, shape = as_array(f"command.{name}", value), (len(walking), columns)
-        if array.ndim == 0 or array.shape not in (shape, (1, columns), (columns,)):
-            raise ParameterError(f"has the wrong shape {array.shape}", field=f"command.{name}", allowed=str(shape))
-        rows = np.empty(shape)
-        rows[:] = array
-        if not ((np.abs(rows) <= LARGEST) | ~walking[:, None]).all():
-            allowed = f"numbers up to {LARGEST:g} for every robot that still walks"
-            raise ParameterError(beyond(rows[walking]), field=f"command.{name}", allowed=allowed)
+        fits = array.shape in (shape, (1, columns), (columns,))
+        require(fits, f"has the wrong shape {array.shape}", f"command.{name}", allowed=str(shape))
+        rows = np.array(np.broadcast_to(array, shape))
+        small, allowed = np.abs(rows[walking]) <= LARGEST, f"numbers up to {LARGEST:g} for every robot that still walks"
+        require(small.all(), beyond(rows[walking]), f"command.{name}", allowed=allowed)
         return rows
 
     def _check(self, stiffness: Array, walking: NDArray[np.bool_]) -> None:
-        if ((stiffness <= 0.0) & walking[:, None]).any():
-            value = float(stiffness[walking].min())
-            raise ParameterError("must be positive", field="command.stiffness", value=value, allowed="N*m/rad")
+        least = float(stiffness[walking].min(initial=np.inf))
+        require(least > 0.0, "must be positive", "command.stiffness", least, "N*m/rad")
         present = self.profile[GOAL]
-        changed = np.abs(stiffness - present) > _SAME * present
-        wrong = changed & ~self._adjustable & walking[:, None]
+        wrong = (np.abs(stiffness - present) > _SAME * present) & ~self._adjustable & walking[:, None]
         if wrong.any():
-            robot, joint = (int(each) for each in np.argwhere(wrong)[0])
-            raise ParameterError(
-                f"the spring of joint {joint + 1} is not adjustable",
-                field="command.stiffness",
-                value=f"{stiffness[robot, joint]:g} N*m/rad",
-                allowed=f"the {present[robot, joint]:.6g} N*m/rad it has, or springs.adjustable in the robot file",
-            )
+            robot, joint = np.argwhere(wrong)[0].tolist()
+            problem = f"the spring of joint {joint + 1} is not adjustable"
+            given = f"{stiffness[robot, joint]:g} N*m/rad"
+            allowed = f"the {present[robot, joint]:.6g} N*m/rad it has, or springs.adjustable in the robot file"
+            raise ParameterError(problem, field="command.stiffness", value=given, allowed=allowed)
 
     def _soften(self, time: float, stiffness: Array, walking: NDArray[np.bool_], within: float) -> None:
         wanted, present = np.clip(stiffness, self._softest, self._stiffest), self.profile[GOAL]
@@ -258,7 +272,7 @@ class Actuators:
             now = self.stiffness(time)
             begun[RAMPING] = now - reference + slope * self.lag
             # This form is as exact for a lag much longer than the ramp.
-            caught_up = slope * self.lag * _decay_less_one(length, self.lag)
+            caught_up = slope * self.lag * _decay(length, self.lag, np.expm1)
             begun[SETTLING] = np.where(moves, (now - reference) * _decay(length, self.lag) + caught_up, now - goal)
         self.profile = np.where(changed, begun, self.profile)
         self.driven = self.driven | changed.any(axis=1)
@@ -278,19 +292,17 @@ class Actuators:
         return values
 
 
-def _decay(time: Any, lag: Array) -> Array:
-    """e^(-t/lag), which is 0 without a lag."""
-    if not lag.any():
-        return np.zeros(np.broadcast_shapes(np.shape(time), lag.shape))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        decay: Array = np.exp(-np.where(lag > 0.0, time / lag, np.inf))
-    return decay
+def _at(ramps: Array, times: Any) -> Array:
+    start, goal, since, until = ramps
+    length = until - since
+    part = np.minimum(np.maximum((times - since) / np.where(length > 0.0, length, 1.0), 0.0), 1.0)
+    return np.where(times >= until, goal, start + part * (goal - start))
 
 
-def _decay_less_one(time: Array, lag: Array) -> Array:
+def _decay(time: Any, lag: Array, power: Callable[[Array], Array] = np.exp) -> Array:
+    """e^(-t/lag), which is 0 without a lag; with :func:`numpy.expm1` less one."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        less: Array = np.expm1(-np.where(lag > 0.0, time / lag, np.inf))
-    return less
+        return power(-np.where(lag > 0.0, time / lag, np.inf))
 
 
 def _reference(profile: Array, time: Any) -> Array:

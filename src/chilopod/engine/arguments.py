@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,9 +15,21 @@ from chilopod.record import LARGEST, LONGEST, Recording
 from chilopod.robot import Robot
 from chilopod.units.quantity import as_number as as_number  # for all engines
 
+Arguments = Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]]
+"""Arguments by name, each with the shape of one row."""
+
 BEGINNING = 1e-9
 """Tolerance of a time at the beginning of a gait cycle, relative to the cycle: rounding of whole multiples of the
 period."""
+
+
+def require(
+    fits: object, problem: str, field: str, value: object = None, allowed: str | None = None, nearest: str | None = None
+) -> None:
+    """Check of an argument: a ParameterError with these parts, see :class:`chilopod.errors.ChilopodError`, unless it
+    fits."""
+    if not fits:
+        raise ParameterError(problem, field=field, value=value, allowed=allowed, nearest=nearest)
 
 
 def beyond(array: Array) -> str:
@@ -43,8 +56,7 @@ def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
         whole = [operator.index(each) for each in seeds]  # type: ignore[attr-defined]
     except TypeError:
         whole = []
-    if not whole or min(whole) < 0:
-        raise ParameterError("must be whole numbers, one for each walk", field=name, value=seeds, allowed="0 or more")
+    require(whole and min(whole) >= 0, "must be whole numbers, one for each walk", name, seeds, "0 or more")
     return whole
 
 
@@ -54,18 +66,18 @@ def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
         marks = np.array(value)
     except (TypeError, ValueError):
         marks = np.empty(0)
-    if marks.dtype != np.bool_ or marks.shape != (count,):
-        raise ParameterError("must be truth values", field=name, value=value, allowed=f"{count} of True or False")
+    fits = marks.dtype == np.bool_ and marks.shape == (count,)
+    require(fits, "must be truth values", name, value, f"{count} of True or False")
     return marks
 
 
 def as_robots(robots: object) -> list[Robot]:
     """One robot or several as a list."""
-    given = [robots] if isinstance(robots, Robot) else robots
-    if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(each, Robot) for each in given):
-        raise ParameterError("must be a Robot or a sequence of Robots", field="robots", value=type(robots).__name__)
-    if not given:
-        raise ParameterError("must not be empty", field="robots", allowed="at least one robot")
+    given: Any = [robots] if isinstance(robots, Robot) else robots
+    listed = isinstance(given, Sequence) and not isinstance(given, str)
+    fits = listed and all(isinstance(each, Robot) for each in given)
+    require(fits, "must be a Robot or a sequence of Robots", "robots", type(robots).__name__)
+    require(given, "must not be empty", "robots", allowed="at least one robot")
     return list(given)
 
 
@@ -78,13 +90,10 @@ def as_robot(robot: object) -> Robot:
 
 def check_wishes(record: object, expected: object) -> float:
     """Checked duration of a walk, s, together with the contents of its record."""
-    if not isinstance(record, Recording | None):
-        raise ParameterError(
-            "must be a Recording or None", field="record", value=record, allowed="a chilopod.record.Recording, or None"
-        )
+    fits, allowed = isinstance(record, Recording | None), "a chilopod.record.Recording, or None"
+    require(fits, "must be a Recording or None", "record", record, allowed)
     seconds = as_number("expected", expected)
-    if not 0.0 <= seconds <= LONGEST:
-        raise ParameterError("must be a duration in s", field="expected", value=expected, allowed=f"0 to {LONGEST:g} s")
+    require(0.0 <= seconds <= LONGEST, "must be a duration in s", "expected", expected, f"0 to {LONGEST:g} s")
     return seconds
 
 
@@ -100,44 +109,30 @@ def standing(
         ("heading", headings, headings.ndim < 2, "a number"),
         ("position", places, places.ndim in (1, 2) and places.shape[-1] == 2, "(2,)"),
     ):
-        if not fits:
-            raise ParameterError(
-                f"has the wrong shape {array.shape}", field=name, allowed=f"{allowed}, or one for each walk"
-            )
-        if not (np.abs(array) <= LARGEST).all():
-            raise ParameterError(beyond(array), field=name, allowed=f"numbers up to {LARGEST:g}")
-    angles = np.broadcast_to(np.atleast_2d(angles), (len(np.atleast_2d(angles)), joints))
-    headings, places = np.atleast_1d(headings), np.atleast_2d(places)
+        require(fits, f"has the wrong shape {array.shape}", name, allowed=f"{allowed}, or one for each walk")
+        _check_size(name, array)
+    angles, headings, places = np.atleast_2d(angles), np.atleast_1d(headings), np.atleast_2d(places)
     try:
         (count,) = np.broadcast_shapes(angles.shape[:1], headings.shape, places.shape[:1])
     except ValueError:
         raise ParameterError("must have the same number of walks", field="joint_angles, heading, position") from None
-    return (
-        np.array(np.broadcast_to(angles, (count, joints))),
-        np.array(np.broadcast_to(headings, (count,))),
-        np.array(np.broadcast_to(places, (count, 2))),
-    )
+    shaped = (angles, (count, joints)), (headings, (count,)), (places, (count, 2))
+    angles, headings, places = (np.array(np.broadcast_to(each, shape)) for each, shape in shaped)
+    return angles, headings, places
+
+
+def _check_size(name: str, array: Array, largest: float = LARGEST) -> None:
+    require((np.abs(array) <= largest).all(), beyond(array), name, allowed=f"numbers up to {largest:g}")
 
 
 def rows_of(
-    robots: Sequence[Robot],
-    arguments: Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]],
-    seeds: Sequence[int] | None = None,
+    robots: Sequence[Robot], arguments: Arguments, seeds: Sequence[int] | None = None
 ) -> tuple[int, dict[str, Array | None]]:
-    """Arguments of ``start`` as arrays with one row a walk.
+    """Arguments of ``start``: the number of walks, and copies of the arrays, with one row a walk; None for an argument
+    that was not given.
 
-    Parameters
-    ----------
-    robots
-        One robot, or one for each walk.
-    arguments
-        Value given and shape of one row, by name. The argument ``friction`` must be positive.
-    seeds
-        One seed, or one for each walk.
-
-    Returns
-    -------
-    Number of walks, and copies of the arrays; None for an argument that was not given.
+    ``arguments`` has the value given and the shape of one row, by name, of which ``friction`` must be positive. There
+    is one robot, or one for each walk, and likewise one seed.
     """
     counts = {"robots": len(robots), "seeds": len(seeds) if seeds else 1}
     arrays: dict[str, Array | None] = {}
@@ -146,22 +141,16 @@ def rows_of(
         if argument is None:
             continue
         array = as_array(name, argument)
-        if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
-            allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
-            raise ParameterError(f"has the wrong shape {array.shape}", field=name, allowed=allowed)
-        largest = (
-            np.finfo(float).max if name == "initial" else LARGEST
-        )  # the state of a walk that diverges may be larger
-        if not (np.abs(array) <= largest).all():
-            raise ParameterError(beyond(array), field=name, allowed=f"numbers up to {largest:g}")
-        if name == "friction" and not (array > 0.0).all():
-            raise ParameterError("must be positive", field=name)
-        arrays[name] = array if array.ndim > len(shape) else array[None]
-        counts[name] = len(array) if array.ndim > len(shape) else 1
+        given = array if array.ndim > len(shape) else array[None]
+        allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
+        require(given.shape[1:] == shape and given.size, f"has the wrong shape {array.shape}", name, allowed=allowed)
+        # The state of a walk that diverges may be larger.
+        _check_size(name, array, np.finfo(float).max if name == "initial" else LARGEST)
+        require(name != "friction" or (array > 0.0).all(), "must be positive", name)
+        arrays[name], counts[name] = given, len(given)
     count = max(counts.values())
     for name, each in counts.items():
-        if each not in (1, count):
-            raise ParameterError(f"has the wrong length {each}", field=name, allowed=f"1 or {count}")
+        require(each in (1, count), f"has the wrong length {each}", name, allowed=f"1 or {count}")
     for name, rows in arrays.items():
         if rows is not None:
             arrays[name] = np.array(np.broadcast_to(rows, (count, *rows.shape[1:])), order="C")
@@ -169,56 +158,31 @@ def rows_of(
 
 
 def rows_anew(
-    which: object,
-    robots: Sequence[Robot],
-    time: float,
-    record: Recording | None,
-    arguments: Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]],
-    seeds: object = None,
+    which: object, robots: Sequence[Robot], time: float, record: Recording | None, arguments: Arguments, seeds: object
 ) -> tuple[NDArray[np.bool_], dict[str, Array | None]]:
-    """Arguments of ``restart`` as arrays with one row for each restarted robot.
-
-    Parameters
-    ----------
-    which, seeds
-        As given.
-    robots, time, record
-        Robots, time and record of the walk.
-    arguments
-        As of :func:`rows_of`.
-
-    Returns
-    -------
-    Mask of the robots, and the arrays; None for an argument that was not given, or if the mask is empty.
-    """
-    marked, cycles = as_marks("which", which, len(robots)), time / robots[0].gait.period
-    if record is not None:
-        raise ParameterError(
-            "must be False for a walk that is recorded: a record covers one walk",
-            field="restart",
-            allowed="a walk that was started with record=None",
-        )
-    if abs(cycles - round(cycles)) > BEGINNING:
-        allowed = f"a whole multiple of the period, {robots[0].gait.period:g} s"
-        raise ParameterError("must be the end of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
+    """Arguments of ``restart``, ``arguments`` as in :func:`rows_of`, of a walk with these robots, time and record: the
+    mask of the robots, and arrays with one row for each restarted robot; None for an argument that was not given, or if
+    the mask is empty."""
+    marked, period = as_marks("which", which, len(robots)), robots[0].gait.period
+    cycles = time / period
+    problem = "must be False for a walk that is recorded: a record covers one walk"
+    require(record is None, problem, "restart", allowed="a walk that was started with record=None")
+    whole, allowed = abs(cycles - round(cycles)) <= BEGINNING, f"a whole multiple of the period, {period:g} s"
+    require(whole, "must be the end of a gait cycle", "restart", f"{time:g} s", allowed)
     count, own = int(marked.sum()), as_seeds(seeds)
-    if own is not None and len(own) != count:
-        raise ParameterError(f"has the wrong length {len(own)}", field="seeds", allowed=str(count))
+    if own is not None:
+        require(len(own) == count, f"has the wrong length {len(own)}", "seeds", allowed=str(count))
     if count == 0:
         return marked, dict.fromkeys(arguments)
     found, rows = rows_of(robots[:count], arguments)
-    if found != count:
-        problem = f"has the wrong length {found}"
-        raise ParameterError(problem, field="initial, friction", allowed=f"1 or {count}")
+    require(found == count, f"has the wrong length {found}", "initial, friction", allowed=f"1 or {count}")
     return marked, rows
 
 
 def check_time(until: float, now: float) -> float:
     """Time to advance to, s; refuses times in the past and times beyond ``LONGEST``."""
     until = as_number("until", until)
-    if not now <= until <= LONGEST:
-        problem = "must not lie before the time of the walk" if until < now else "must be a time in s"
-        raise ParameterError(
-            problem, field="until", value=f"{until:g} s", allowed=f"{now:g} s or later, at most {LONGEST:g} s"
-        )
+    problem = "must not lie before the time of the walk" if until < now else "must be a time in s"
+    allowed = f"{now:g} s or later, at most {LONGEST:g} s"
+    require(now <= until <= LONGEST, problem, "until", f"{until:g} s", allowed)
     return until

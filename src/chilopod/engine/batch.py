@@ -55,13 +55,10 @@ def begin(
     arguments = {"initial": (initial, (size,)), "friction": (friction, feet), "target": (target, (2,))}
     count, rows = rows_of(robots, arguments, noise)
     states, factors = rows["initial"], rows["friction"]
-    return Beginning(
-        robots * count if len(robots) == 1 else robots,
-        np.tile(standing, (count, 1)) if states is None else states,
-        np.ones((count, *feet)) if factors is None else factors,
-        rows["target"],
-        None if noise is None else noise * (count if len(noise) == 1 else 1),
-    )
+    states = np.tile(standing, (count, 1)) if states is None else states
+    factors = np.ones((count, *feet)) if factors is None else factors
+    noise = noise * count if noise and len(noise) == 1 else noise
+    return Beginning(robots * count if len(robots) == 1 else robots, states, factors, rows["target"], noise)
 
 
 def resumed(traits: Traits, saved: bytes, make: Callable[[Beginning, Recording | None, float], _Kind]) -> _Kind:
@@ -84,18 +81,12 @@ def with_end(data: xr.Dataset, walk: Walk, record: Recording) -> xr.Dataset:
 
 
 class BatchWalk(Walk):
-    """Robots, actuators, targets and time of a walk; a sample of its record has ``numbers`` numbers."""
+    """Robots, actuators, targets and time of a walk; a sample of its record has ``size`` numbers."""
 
     def __init__(
-        self,
-        traits: Traits,
-        begun: Beginning,
-        record: Recording | None,
-        tolerance: float,
-        expected: float,
-        numbers: int,
+        self, traits: Traits, begun: Beginning, record: Recording | None, tolerance: float, expected: float, size: int
     ) -> None:
-        check_size(record, expected, numbers)
+        check_size(record, expected, size)
         keep = record is not None
         self.traits = traits
         self._robots, self._factors = tuple(begun.robots), begun.factors
@@ -116,12 +107,9 @@ class BatchWalk(Walk):
 
     def save(self) -> bytes:
         settings, arrays = self._saved()
-        settings |= {
-            "record": None if self._record is None else asdict(self._record),
-            "tolerance": self._tolerance,
-            "time": self._time,
-        }
-        arrays |= {"factors": self._factors}
+        record = None if self._record is None else asdict(self._record)
+        settings |= {"record": record, "tolerance": self._tolerance, "time": self._time}
+        arrays["factors"] = self._factors
         arrays |= {f"target_{name}": values for name, values in self._targets.state().items()}
         arrays |= {f"told_{name}": values for name, values in self._actuators.state().items()}
         return pack(self.traits, self._robots, settings, arrays)

@@ -21,25 +21,12 @@ _MOVED = 1e-5  # rad
 
 
 def check_engine(engine: Engine, robot: Robot, seed: int = 0) -> tuple[str, ...]:
-    """Check an engine against the promises of :mod:`chilopod.engine.contract` with a few walks of two seconds.
+    """Check an engine against the promises of :mod:`chilopod.engine.contract` with a few walks of two seconds; return
+    the promises, which were tested and kept.
 
-    Parameters
-    ----------
-    engine
-        A module such as :mod:`chilopod.planar`, or an object.
-    robot
-        A robot that the engine can walk. Its springs are made adjustable for some of the walks.
-    seed
-        Seed of the random instants at which the walks are interrupted.
-
-    Returns
-    -------
-    Promises that were tested and kept.
-
-    Raises
-    ------
-    AnalysisError
-        At the first broken promise; the message says what happened instead.
+    The engine is a module such as :mod:`chilopod.planar`, or an object, and can walk the robot, whose springs are made
+    adjustable for some of the walks. The seed is that of the random instants at which the walks are interrupted. Raises
+    AnalysisError at the first broken promise; the message says what happened instead.
     """
     trial = Trial(engine, robot, np.random.default_rng(seed))
     for promise, attempt in _PROMISES.items():
@@ -79,16 +66,13 @@ def _sight(trial: Trial) -> None:
     expect_near(seen.distance, np.full(count, np.hypot(*away)), 0.02, "distance of the target, m")
     expect_near(seen.bearing, np.full(count, np.arctan2(away[1], away[0]) - 0.3), 0.02, "bearing of the target, rad")
     nothing = trial.engine.start(trial.robot).observe()
-    expect(
-        np.isnan(nothing.bearing).all() and np.isnan(nothing.distance).all(),
-        "bearing or distance is finite without a target",
-    )
+    unseen = np.isnan([nothing.bearing, nothing.distance]).all()
+    expect(unseen, "bearing or distance is finite without a target")
     for name in shapes:
         getattr(seen, name)[:] = 123.0
     again = walk.observe()
-    expect(
-        all((getattr(again, name) != 123.0).all() for name in shapes), "writing into an observation changes the walk"
-    )
+    for name in shapes:
+        expect((getattr(again, name) != 123.0).all(), "writing into an observation changes the walk")
 
 
 def _records(trial: Trial) -> None:
@@ -99,10 +83,8 @@ def _records(trial: Trial) -> None:
         expect(name in data, f"{name} is missing")
         expect(data[name].dims == dims, f"{name} has dimensions {data[name].dims}, not {dims}")
         expect(data[name].attrs.get("units") == units, f"{name} has unit {data[name].attrs.get('units')}, not {units}")
-    expect(
-        (data.sizes["robot"], data.sizes["joint"]) == (count, joints),
-        "the record has a wrong number of robots or joints",
-    )
+    sizes = data.sizes["robot"], data.sizes["joint"]
+    expect(sizes == (count, joints), "the record has a wrong number of robots or joints")
     expect_near(data.time.values, np.arange(101) / 50.0, 0.02, "time: 50 samples a second up to the end, s")
     expect_near(data.position.values[0], np.tile([0.2, -0.1], (count, 1)), 1e-6, "position at the start, m")
     expect_near(data.heading.values[0], np.full(count, 0.3), 1e-6, "heading at the start, rad")
@@ -111,9 +93,8 @@ def _records(trial: Trial) -> None:
     expect(data.attrs.get("engine") == trial.engine.traits.name, "the attribute engine differs from the engine's name")
     length = float(np.linalg.norm(data.position[-1, 0] - data.position[0, 0]))
     usual = END * trial.robot.gait.speed
-    expect(
-        0.1 * usual < length < 3.0 * usual, f"displacement in {END:g} s: {length:.3g} m, straight walk {usual:.3g} m"
-    )
+    said = f"displacement in {END:g} s: {length:.3g} m, straight walk {usual:.3g} m"
+    expect(0.1 * usual < length < 3.0 * usual, said)
     nothing = trial.walked(trial.start(record=None))
     expect(nothing.sizes["time"] == 0, "a walk without a record has samples")
 
@@ -123,11 +104,9 @@ def _determinism(trial: Trial) -> None:
 
 
 def _splitting(trial: Trial) -> None:
-    whole = trial.walked(trial.start())
-    stops = np.round(trial.random.uniform(0.0, END, 40), 4)
-    expect_same(
-        whole, trial.walked(trial.start(), stops=stops.tolist()), "one advance, and forty with observations between"
-    )
+    whole, stops = trial.walked(trial.start()), np.round(trial.random.uniform(0.0, END, 40), 4).tolist()
+    cut = trial.walked(trial.start(), stops=stops)
+    expect_same(whole, cut, "one advance, and forty with observations between")
 
 
 def _batching(trial: Trial) -> None:
@@ -159,16 +138,11 @@ def _noise(trial: Trial) -> None:
         walk.advance(0.5)
         return walk.observe().bearing
 
-    none, some, same, others = seen(None), seen((1, 2, 3)), seen((1, 2, 3)), seen((4, 5, 6))
-    expect(np.array_equal(some, same, equal_nan=True), "equal seeds give different bearings")
-    noisy = trial.engine.traits.noisy
-    expect(
-        np.array_equal(some, others, equal_nan=True) != noisy,
-        f"noisy is {noisy}, which contradicts walks with different seeds",
-    )
-    expect(
-        np.array_equal(none, some, equal_nan=True) != noisy, f"noisy is {noisy}, which contradicts a walk without seeds"
-    )
+    some, noisy = seen((1, 2, 3)), trial.engine.traits.noisy
+    expect(np.array_equal(some, seen((1, 2, 3)), equal_nan=True), "equal seeds give different bearings")
+    for seeds, what in (((4, 5, 6), "walks with different seeds"), (None, "a walk without seeds")):
+        differs = not np.array_equal(some, seen(seeds), equal_nan=True)
+        expect(differs == noisy, f"noisy is {noisy}, which contradicts {what}")
 
 
 def _refusals(trial: Trial) -> None:

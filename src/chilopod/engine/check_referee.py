@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -9,7 +10,6 @@ import numpy as np
 
 from chilopod.engine.check_trial import END, Trial, expect, expect_near, expect_refused, expect_same
 from chilopod.engine.contract import Command, Observation, Status, Walk
-from chilopod.frozen import Array
 from chilopod.record import Recording
 
 BREAKS = 0.6
@@ -162,15 +162,9 @@ def restarts(trial: Trial) -> None:
 
 
 def _for_one(command: Command) -> Command:
-    def row(value: Any) -> Array | None:
-        return None if value is None else np.asarray(value)[1:2]
-
-    return Command(
-        leg_yaw=row(command.leg_yaw),
-        stiffness=row(command.stiffness),
-        joint_torque=row(command.joint_torque),
-        within=command.within,
-    )
+    given = {name: value for name, value in vars(command).items() if isinstance(value, np.ndarray)}
+    own: dict[str, Any] = {name: value[1:2] for name, value in given.items()}
+    return replace(command, **own)
 
 
 def _expect_alike(walk: Walk, robot: int, alone: Walk, whose: str) -> None:

@@ -35,10 +35,9 @@ class Trial:
     def __init__(self, engine: Engine, robot: Robot, random: np.random.Generator) -> None:
         self.engine, self.random = engine, random
         adjustable = robot.override("springs.adjustable", True)
-        softer = [
-            adjustable.with_value("springs.stiffness[0]", part * max(robot.springs.stiffness)) for part in (0.3, 1)
-        ]
-        self.robot, self.robots = robot, (adjustable, *softer)
+        most = max(robot.springs.stiffness)
+        others = (adjustable.with_value("springs.stiffness[0]", part * most) for part in (0.3, 1))
+        self.robot, self.robots = robot, (adjustable, *others)
         joints = robot.body.modules - 1
         self.bends = _BENT / joints * random.uniform(-1.0, 1.0, (len(self.robots), joints))
 

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+Marks = NDArray[np.bool_]
+"""Mask of the robots of a batch, shape (robots,)."""
+
+
 class Status(Labelled):
     """Status of a walk; each member's ``sentence`` explains it."""
 
@@ -36,17 +40,9 @@ class Status(Labelled):
 
 @dataclass(frozen=True)
 class Event:
-    """An instant of every gait cycle at which a controller is called.
-
-    Attributes
-    ----------
-    name
-        Name by which the controller recognizes the event.
-    phase
-        Time since the start of the cycle over its period, in [0, 1).
-    window
-        Time available for the action, s.
-    """
+    """An instant of every gait cycle at which a controller is called: a name by which the controller recognizes it, its
+    phase, the time since the start of the cycle over its period, in [0, 1), and the window, which is the time available
+    for the action, s."""
 
     name: str
     phase: float
@@ -61,11 +57,9 @@ class Observation:
     ----------
     time
         Time of the observation, s.
-    bearing
-        Direction of the target relative to the heading of module 1, left positive, rad in [-pi, pi); NaN where it is
-        not seen. Shape (robots,).
-    distance
-        Distance of the target from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
+    bearing, distance
+        Direction of the target relative to the heading of module 1, left positive, rad in [-pi, pi), and its distance
+        from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
     joint_angles
         Angles of the yaw joints, heading of the module behind minus heading of the module before (positive: bent to the
         right), rad, shape (robots, N-1); NaN for a robot that no longer walks.
@@ -154,30 +148,17 @@ class Walk(Protocol):
     def pose(self) -> Array:
         """Poses of the robots now: x and y of the centre of module 1, m, and its heading, rad, up to whole turns.
 
-        Referees and displays use them; controllers receive only :meth:`observe`.
-
-        Returns
-        -------
-        Shape (robots, 3); NaN for robots that no longer walk.
+        Shape (robots, 3); NaN for robots that no longer walk. Referees and displays use them; controllers receive only
+        :meth:`observe`.
         """
 
     def aim(self, target: ArrayLike) -> None:
-        """Move the targets of the robots from now on. The motion of the robots does not change.
+        """Move the targets of the robots from now on to positions on the floor, m, shape (robots, 2) or (2,); a row of
+        NaN removes the target of a robot. The motion of the robots does not change."""
 
-        Parameters
-        ----------
-        target
-            Positions on the floor, m, shape (robots, 2) or (2,); a row of NaN removes the target of a robot.
-        """
-
-    def halt(self, which: NDArray[np.bool_]) -> None:
-        """Stop some robots finally, with ``HALTED``; the results of the others do not change.
-
-        Parameters
-        ----------
-        which
-            Mask of the robots, shape (robots,). Robots that no longer walk keep their status.
-        """
+    def halt(self, which: Marks) -> None:
+        """Stop some robots finally, by a mask of shape (robots,), with ``HALTED``; those that no longer walk keep their
+        status, and the results of the others do not change."""
 
     def states(self) -> Array:
         """States of the robots now, for ``initial`` of :meth:`chilopod.engine.Engine.start` or :meth:`restart`.
@@ -189,27 +170,17 @@ class Walk(Protocol):
         """
 
     def restart(
-        self,
-        which: NDArray[np.bool_],
-        initial: ArrayLike,
-        friction: ArrayLike | None = None,
-        seeds: Sequence[int] | None = None,
+        self, which: Marks, initial: ArrayLike, friction: ArrayLike | None = None, seeds: Sequence[int] | None = None
     ) -> None:
-        """Start some robots again, at the beginning of a gait cycle; the results of the others do not change.
+        """Start some robots again, by a mask of shape (robots,), at the beginning of a gait cycle; the results of the
+        others do not change.
 
         Whatever their status, they walk as if freshly started, up to the rounding of times: springs of the file, legs
         straight, no torque. Their targets stay in place. A walk with a record cannot be restarted.
 
-        Parameters
-        ----------
-        which
-            Mask of the robots, shape (robots,).
-        initial
-            States as for :meth:`chilopod.engine.Engine.start`, one row for all of them or one each.
-        friction
-            Factors as for :meth:`chilopod.engine.Engine.start`; None keeps those of the walk.
-        seeds
-            Seeds of the noise of their sensors from now on, one each; None continues the noise.
+        States and factors of friction are as for :meth:`chilopod.engine.Engine.start`, one row for all of them or one
+        each; without factors those of the walk remain. Seeds, one each, are of the noise of their sensors from now on;
+        without them the noise continues.
         """
 
     def command(self, command: Command) -> None:
@@ -262,22 +233,17 @@ class Traits:
 
     Attributes
     ----------
-    name
-        Name of the engine on the command line and in records.
-    sentence
-        Description of the engine in a sentence.
+    name, sentence
+        Name of the engine on the command line and in records, and its description.
     exact
         True if its walks are those of the planar theory (:mod:`chilopod.analysis`), so that branches hold for them.
-    noisy
-        True if its sensors have noise of their own, drawn from ``seeds``.
-    poses
-        True if it can record the positions of all joints, to be drawn.
+    noisy, poses
+        True if its sensors have noise of their own, drawn from ``seeds``; if it can record the positions of all joints.
     threads
         True if walks of several threads run at the same time, because the interpreter's lock is free meanwhile.
-    robots_per_core
-        Number of robots that one core should walk at a time: a few seconds of work.
-    walks_per_round
-        Number of walks that a search may spend on one round of trials.
+    robots_per_core, walks_per_round
+        Number of robots that one core should walk at a time, a few seconds of work, and number of walks that a search
+        may spend on one round of trials.
     duration_ratio
         Ratio of a task's duration to its duration at the speed of the straight walk without slip.
     version
@@ -311,28 +277,13 @@ class Engine(Protocol):
         walk."""
 
     def initial_states(
-        self,
-        robot: Robot,
-        joint_angles: ArrayLike = 0.0,
-        heading: ArrayLike = 0.0,
-        position: ArrayLike = (0.0, 0.0),
+        self, robot: Robot, joint_angles: ArrayLike = 0.0, heading: ArrayLike = 0.0, position: ArrayLike = (0.0, 0.0)
     ) -> Array:
-        """States of robots that are about to walk.
+        """States of robots that are about to walk, for ``initial`` of :meth:`start`, shape (robots, n), with n the
+        engine's affair.
 
-        Parameters
-        ----------
-        robot
-            The robot.
-        joint_angles
-            rad, shape (N-1,) or (robots, N-1).
-        heading
-            Heading of module 1, rad, a number or shape (robots,).
-        position
-            Position of its centre, m, shape (2,) or (robots, 2).
-
-        Returns
-        -------
-        For ``initial`` of :meth:`start`, shape (robots, n), with n the engine's affair.
+        Joint angles are in rad, shape (N-1,) or (robots, N-1); the heading of module 1 in rad, a number or shape
+        (robots,), and the position of its centre in m, shape (2,) or (robots, 2).
         """
 
     def start(

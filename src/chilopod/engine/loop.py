@@ -10,18 +10,18 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 from heapq import merge
 from itertools import chain, count, islice, pairwise, takewhile
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.engine.arguments import as_array, as_number, check_time
+from chilopod.engine.arguments import as_array, as_number, check_time, require
 from chilopod.engine.contract import Command, Controller, Event, Foresees, Observation, Walk
-from chilopod.errors import AnalysisError, ParameterError, in_words
+from chilopod.engine.named import foreign
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
 
-_T = TypeVar("_T")
 Heard = Callable[[Event, Observation, Command], None]
 
 _MOMENT = 0.3
@@ -85,19 +85,17 @@ def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator
 def _numbered(controller: Controller, gait: Gait, since: float, until: float) -> Iterator[tuple[float, int, Event]]:
     """Instants of :func:`event_times` with the number of each event, without the cycles that were over at ``since``
     (s), so that short advances need not count from the beginning."""
-    events = _asked(controller, "events", lambda: list(islice(controller.events(gait), _MOST_EVENTS + 1)))
     where = _of(controller, "events")
-    if len(events) > _MOST_EVENTS:
-        raise ParameterError("must be fewer", field=where, allowed=f"at most {_MOST_EVENTS} in a gait cycle")
+    with foreign(AnalysisError, "raised", field=where):
+        events = list(islice(controller.events(gait), _MOST_EVENTS + 1))
+    fewer, allowed = len(events) <= _MOST_EVENTS, f"at most {_MOST_EVENTS} in a gait cycle"
+    require(fewer, "must be fewer", where, allowed=allowed)
     for event in events:
-        if not isinstance(event, Event):
-            raise ParameterError("must be a chilopod.engine.Event", field=where, value=event)
-        if not 0.0 <= as_number(where, event.phase) < 1.0:
-            said = "must be a phase of the gait cycle"
-            raise ParameterError(said, field=where, value=event.phase, allowed="0 to less than 1")
-        if not 0.0 <= as_number(where, event.window) < math.inf:
-            said = "must have a finite window"
-            raise ParameterError(said, field=where, value=event.window, allowed="0 s or more")
+        require(isinstance(event, Event), "must be a chilopod.engine.Event", where, event)
+        fits = 0.0 <= as_number(where, event.phase) < 1.0
+        require(fits, "must be a phase of the gait cycle", where, event.phase, "0 to less than 1")
+        fits = 0.0 <= as_number(where, event.window) < math.inf
+        require(fits, "must have a finite window", where, event.window, "0 s or more")
     events.sort(key=lambda event: event.phase)
     first = _whole(since, gait.period)
     for cycle in range(first, math.ceil(until / gait.period) if events else first):
@@ -123,40 +121,31 @@ def steer(
     progress: Progress = silent,
     heard: Heard | None = None,
 ) -> None:
-    """Advance a walk to a time, commanded by a controller at its events, or until its referee ends it.
+    """Advance a walk to a time, commanded by a controller at its events, or until its referee ends it. Raises
+    ParameterError for invalid events or commands, in a message that names the controller, and AnalysisError if the
+    controller raises, with its exception as the cause.
 
     Parameters
     ----------
-    walk, until
-        Walk, changed in place, and the time to advance it to, s.
-    controller
-        Controller; None keeps the last setpoints.
+    walk, until, controller
+        Walk, changed in place, time to advance it to, s, and its controller; None keeps the last setpoints.
     bearing_noise
         Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events from the start of the walk.
-    progress
-        Function of the fraction done (0 to 1) and a few words.
-    heard
-        Function of each event, of a copy of what the controller was shown, and of its command.
-
-    Raises
-    ------
-    ParameterError
-        For invalid events or commands; the message names the controller.
-    AnalysisError
-        If the controller raises, with its exception as the cause.
+    progress, heard
+        Function of the fraction done (0 to 1) and a few words; function of each event, of a copy of what the controller
+        was shown, and of its command.
     """
     gait, begun = walk.robots[0].gait, walk.time
     until = check_time(until, begun)
-    if not callable(progress):
-        raise ParameterError("must be a function of two arguments", field="progress", value=progress)
+    require(callable(progress), "must be a function of two arguments", "progress", progress)
     noise = None
     if controller is not None and bearing_noise is not None:
         walks, events = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))
         noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
-        if noise.ndim != 2 or len(noise) != walks or noise.shape[1] < events:
-            allowed = f"({walks}, {events} or more)"
-            raise ParameterError(f"has the wrong shape {noise.shape}", field="bearing_noise", allowed=allowed)
+        fits = noise.ndim == 2 and len(noise) == walks and noise.shape[1] >= events
+        allowed = f"({walks}, {events} or more)"
+        require(fits, f"has the wrong shape {noise.shape}", "bearing_noise", allowed=allowed)
 
     def tell() -> None:
         # Without a target a referee ends the walk before it begins.
@@ -183,7 +172,8 @@ def steer(
         assert controller is not None
         shown = deepcopy(seen) if heard else seen  # the controller may write into it
         called_at = clock.perf_counter()
-        command = _answer(controller, event, seen)
+        with foreign(AnalysisError, "raised", field=_of(controller, "act")):
+            command = controller.act(event, seen)
         thought += clock.perf_counter() - called_at
         try:
             walk.command(command)
@@ -207,17 +197,16 @@ def _instants(
     """Instants before ``until`` (s) at which the controller or the referee observes, some of them before ``since``:
     number of the event, the event or None for the referee, which comes first, and time of the event after it, s, NaN
     if it is the last."""
-    events: Iterator[tuple[float, int, Event | None, float]] = iter(())
+    instants: list[Iterator[tuple[float, int, Event | None, float]]] = []
     if controller is not None:
         asked = _numbered(controller, gait, since, until)
         last = np.nan, -1, Event("", 0.0, 0.0)
-        events = ((*each, after[0]) for each, after in pairwise(chain(asked, [last])))
-    looks: Iterator[tuple[float, int, Event | None, float]] = iter(())
+        instants.append((*each, after[0]) for each, after in pairwise(chain(asked, [last])))
     if referee is not None:
         every = referee.every
         times = (n * every for n in count(_whole(since, every)))
-        looks = ((time, -1, None, np.nan) for time in takewhile(lambda time: time < until, times))
-    return merge(events, looks, key=lambda each: each[:2])
+        instants.append((time, -1, None, np.nan) for time in takewhile(lambda time: time < until, times))
+    return merge(*instants, key=lambda each: each[:2])
 
 
 class _Pace:
@@ -244,19 +233,6 @@ class _Pace:
         took = clock.perf_counter() - begun
         if length > 0.5 * self._stretch:
             self._stretch = max(_SHORTEST, self._stretch * min(2.0, _MOMENT / max(took, 1e-9)))
-
-
-def _answer(controller: Controller, event: Event, seen: Observation) -> Command:
-    return _asked(controller, "act", lambda: controller.act(event, seen))
-
-
-def _asked(controller: Controller, name: str, ask: Callable[[], _T]) -> _T:
-    try:
-        return ask()
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # foreign code may raise anything
-        raise AnalysisError(f"raised {in_words(error)}", field=_of(controller, name)) from error
 
 
 def _of(controller: Controller, name: str) -> str:

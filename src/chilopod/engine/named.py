@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from typing import Any, Final, cast
 
 import numpy as np
 
+from chilopod.engine.arguments import require
 from chilopod.engine.contract import Controller, Engine, Observation, Traits, Walk, missing_parts
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words, nearest_name
 from chilopod.frozen import Array
@@ -33,15 +35,14 @@ def engine_named(name: str) -> Engine:
     The engine is imported here, because MuJoCo takes a moment to load.
     """
     engine: Engine
-    if not isinstance(name, str):
-        raise ParameterError("must be a name", field="engine", value=name, allowed=", ".join(ENGINES))
+    known = ", ".join(ENGINES)
+    require(isinstance(name, str), "must be a name", "engine", name, known)
     if name in _MODULES:
         engine = import_module(_MODULES[name])  # a module is an engine
         return engine
     if ":" not in name:
-        problem = "must be one of the engines"
-        allowed = f"{', '.join(ENGINES)}, or package.module:object"
-        raise ParameterError(problem, field="engine", value=name, allowed=allowed, nearest=nearest_name(name, ENGINES))
+        allowed, near = f"{known}, or package.module:object", nearest_name(name, ENGINES)
+        raise ParameterError("must be one of the engines", field="engine", value=name, allowed=allowed, nearest=near)
     return _Own(name, _imported("engine", name))
 
 
@@ -49,17 +50,12 @@ class _Own:
     """Engine from outside chilopod; errors in it name the engine."""
 
     def __init__(self, name: str, engine: Any) -> None:
-        if isinstance(engine, type):
-            raise ParameterError(
-                "must be an object, not a class", field="engine", value=name, allowed="an instance of that class"
-            )
-        missing = [each for each in PARTS if not hasattr(engine, each)]
-        if missing:
-            raise ParameterError(f"must be an engine: attribute {missing[0]} is missing", field="engine", value=name)
-        if not isinstance(engine.traits, Traits):
-            raise ParameterError(
-                "must be an engine: its traits must be a chilopod.engine.Traits", field="engine", value=name
-            )
+        allowed = "an instance of that class"
+        require(not isinstance(engine, type), "must be an object, not a class", "engine", name, allowed)
+        for each in PARTS:
+            require(hasattr(engine, each), f"must be an engine: attribute {each} is missing", "engine", name)
+        known = isinstance(engine.traits, Traits)
+        require(known, "must be an engine: its traits must be a chilopod.engine.Traits", "engine", name)
         self._name, self._engine = f"engine {name}", engine
         self.traits: Traits = engine.traits
 
@@ -90,11 +86,9 @@ class _Own:
         walk: Any = _theirs(self._name, how, getattr(self._engine, how), *arguments, **named)
         missing = _theirs(self._name, how, missing_parts, walk)
         if missing:
-            raise AnalysisError(
-                f"{how} must return a chilopod.engine.Walk; missing: {', '.join(missing)}", field=self._name
-            )
-        wrapped: Any = _OwnWalk(self._name, walk)
-        return wrapped
+            problem = f"{how} must return a chilopod.engine.Walk; missing: {', '.join(missing)}"
+            raise AnalysisError(problem, field=self._name)
+        return cast(Walk, _OwnWalk(self._name, walk))
 
 
 class _OwnWalk:
@@ -137,20 +131,27 @@ class _OwnWalk:
 
     def _check(self, what: str, values: Any, shape: tuple[int, ...]) -> None:
         if not isinstance(values, np.ndarray) or values.dtype.kind != "f" or values.shape != shape:
-            found = (
-                f"{values.dtype} of shape {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
-            )
+            shaped = isinstance(values, np.ndarray)
+            found = f"{values.dtype} of shape {values.shape}" if shaped else type(values).__name__
             raise AnalysisError(f"{what} must be an array of floats of shape {shape}, not {found}", field=self._name)
+
+
+@contextmanager
+def foreign(kind: type[ChilopodError], problem: str, *passed: type[ChilopodError], **parts: Any) -> Iterator[None]:
+    """Turn what foreign code raises, which may be anything, into an error of chilopod with these parts, but for errors
+    that are ``passed`` on."""
+    try:
+        yield
+    except BaseException as error:
+        if isinstance(error, (KeyboardInterrupt, *passed)):
+            raise
+        raise kind(f"{problem} {in_words(error)}", **parts) from error
 
 
 def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Any:
     """Result of a call of foreign code; an error in it names the code."""
-    try:
+    with foreign(AnalysisError, f"{what} raised", ChilopodError, field=who):
         return call(*arguments, **named)
-    except (ChilopodError, KeyboardInterrupt):
-        raise
-    except BaseException as error:
-        raise AnalysisError(f"{what} raised {in_words(error)}", field=who) from error
 
 
 def controller_named(path: str) -> Controller:
@@ -159,14 +160,9 @@ def controller_named(path: str) -> Controller:
     made = _imported("controller", path)
     if not isinstance(made, type):
         raise ParameterError("must name a class", field="controller", value=path, allowed="package.module:Class")
-    try:
+    parts = {"field": "controller", "value": path, "allowed": "a class whose fields all have defaults"}
+    with foreign(ParameterError, "cannot be made:", ParameterError, **parts):
         controller: Controller = made()
-    except (ParameterError, KeyboardInterrupt):
-        raise
-    except BaseException as error:  # foreign code
-        problem = f"cannot be made: {in_words(error)}"
-        allowed = "a class whose fields all have defaults"
-        raise ParameterError(problem, field="controller", value=path, allowed=allowed) from error
     check_controller(controller)
     return controller
 
@@ -176,15 +172,11 @@ def check_controller(controller: Controller) -> None:
     ParameterError if it is not."""
     kind = type(controller)
     for name in ("events", "act"):
-        if not callable(getattr(controller, name, None)):
-            raise ParameterError(
-                f"must have a method {name}", field="controller", value=kind.__name__, allowed="events and act"
-            )
+        there = callable(getattr(controller, name, None))
+        require(there, f"must have a method {name}", "controller", kind.__name__, "events and act")
     frozen = dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen
-    if not frozen:
-        problem = "must be immutable, because its fields name the trial"
-        allowed = "a frozen dataclass: @dataclass(frozen=True)"
-        raise ParameterError(problem, field="controller", value=kind.__name__, allowed=allowed)
+    problem = "must be immutable, because its fields name the trial"
+    require(frozen, problem, "controller", kind.__name__, "a frozen dataclass: @dataclass(frozen=True)")
 
 
 def path_of(kind: type) -> str:
@@ -193,20 +185,14 @@ def path_of(kind: type) -> str:
 
 
 def _imported(field: str, path: str) -> Any:
-    if not _PATH.fullmatch(path):
-        kind = "Class" if field == "controller" else "object"
-        raise ParameterError("must name an object", field=field, value=path, allowed=f"package.module:{kind}")
+    allowed = f"package.module:{'Class' if field == 'controller' else 'object'}"
+    require(_PATH.fullmatch(path), "must name an object", field, path, allowed)
     module_name, _, name = path.partition(":")
-    try:
+    with foreign(ParameterError, "cannot be imported:", field=field, value=path):
         found: Any = import_module(module_name)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # importing a foreign module may raise anything
-        raise ParameterError(f"cannot be imported: {in_words(error)}", field=field, value=path) from error
     for part in name.split("."):
         if not hasattr(found, part):
-            raise ParameterError(
-                f"{module_name} has no {name}", field=field, value=path, nearest=nearest_name(part, dir(found))
-            )
+            near = nearest_name(part, dir(found))
+            raise ParameterError(f"{module_name} has no {name}", field=field, value=path, nearest=near)
         found = getattr(found, part)
     return found

@@ -7,28 +7,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine.arguments import as_array
-from chilopod.errors import ParameterError
+from chilopod.engine.arguments import as_array, require
 from chilopod.frozen import Array
 from chilopod.record import LARGEST
 
 
 class Targets:
-    """Targets on the floor, one for each robot, that may be moved while the robots walk.
+    """Targets on the floor, one for each of a number of robots, that may be moved while the robots walk.
 
-    Parameters
-    ----------
-    robots
-        Number of robots.
-    start
-        Positions at the start, m, shape (robots, 2), or None.
-    keep
-        True to log the positions, for :meth:`recorded`.
-
-    Attributes
-    ----------
-    present
-        Positions now, m, shape (robots, 2), NaN for a robot without a target; never written into, only replaced.
+    They are at ``start`` first, m, shape (robots, 2), or nowhere if None; with ``keep`` their positions are logged, for
+    :meth:`recorded`. ``present`` are the positions now, m, shape (robots, 2), NaN for a robot without a target; it is
+    never written into, only replaced.
     """
 
     def __init__(self, robots: int, start: Array | None = None, keep: bool = True) -> None:
@@ -39,26 +28,18 @@ class Targets:
     @property
     def there(self) -> NDArray[np.bool_]:
         """Mask of the robots that have a target now, shape (robots,)."""
-        there: NDArray[np.bool_] = np.isfinite(self.present[:, 0])
-        return there
+        return np.asarray(np.isfinite(self.present[:, 0]))
 
     def move(self, time: float, target: ArrayLike) -> None:
-        """Move the targets from now on; a move at time 0 changes the start.
-
-        Parameters
-        ----------
-        time
-            Time of the move, s, not before the last one.
-        target
-            New positions, m, shape (robots, 2) or (2,); a row of NaN for a robot without a target.
-        """
+        """Move the targets from a time on, s, not before the last move, to positions, m, shape (robots, 2) or (2,); a
+        row of NaN is no target. A move at time 0 changes the start."""
         given, shape = as_array("target", target), self.present.shape
-        if given.shape not in (shape, (2,)):
-            raise ParameterError(f"has the wrong shape {given.shape}", field="target", allowed=f"(2,) or {shape}")
+        fits = given.shape in (shape, (2,))
+        require(fits, f"has the wrong shape {given.shape}", "target", allowed=f"(2,) or {shape}")
         none = np.isnan(given)
-        if (np.abs(given) > LARGEST).any() or (none[..., 0] != none[..., 1]).any():
-            allowed = f"x and y in m, up to {LARGEST:g}, or NaN for both without a target"
-            raise ParameterError("must be a finite position", field="target", allowed=allowed)
+        fits = not (np.abs(given) > LARGEST).any() and (none[..., 0] == none[..., 1]).all()
+        allowed = f"x and y in m, up to {LARGEST:g}, or NaN for both without a target"
+        require(fits, "must be a finite position", "target", allowed=allowed)
         if ((given == self.present) | (none & np.isnan(self.present))).all():
             return
         places = np.empty(shape)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.engine import Command
-from chilopod.engine.arguments import as_array
+from chilopod.engine.arguments import as_array, require
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.robot import Robot
@@ -34,14 +34,8 @@ class Actions:
     of its swing; the springs ramp with the leg that swings first in the cycle. Thus an action takes effect within a
     gait cycle of its observation, and feet are not dragged across the floor.
 
-    Attributes
-    ----------
-    robot, joints
-        Robot with an actuator for each of the springs, and their joints, counted from 0.
-    softest, stiffest
-        Ends of the range of each spring, N*m/rad.
-    legs
-        Leg controller that defines yaw limit and swing.
+    The robot has an actuator for each of the springs, whose joints are counted from 0; ``softest`` and ``stiffest`` are
+    the ends of the range of each spring, N*m/rad, and the controller ``legs`` defines yaw limit and swing.
     """
 
     robot: Robot
@@ -57,35 +51,29 @@ class Actions:
         A robot without any actuator gets ideal ones. The default range goes from a seventh of the stiffest spring of
         the axis to that spring. Raises ParameterError if a spring has no actuator, or an empty range.
         """
-        if springs not in SPRINGS:
-            nearest = nearest_name(str(springs), SPRINGS)
-            raise ParameterError(f"must be {' or '.join(SPRINGS)}", field="springs", value=springs, nearest=nearest)
+        near = nearest_name(str(springs), SPRINGS)
+        require(springs in SPRINGS, f"must be {' or '.join(SPRINGS)}", "springs", springs, nearest=near)
         own = robot.springs
         if own.adjustable is None:
             every = springs == "all"
             robot = robot.override("springs.adjustable" if every else "springs.adjustable[0]", True)
         can = robot.springs.adjustable or ()
         joints = (0,) if springs == "first" else tuple(joint for joint, each in enumerate(can) if each)
-        if not any(can) or not all(can[joint] for joint in joints):
-            raise ParameterError(
-                "must be true: the action sets the first spring", field="springs.adjustable[0]", value=False
-            )
+        driven = any(can) and all(can[joint] for joint in joints)
+        require(driven, "must be true: the action sets the first spring", "springs.adjustable[0]", False)
         most = max(own.stiffness)
         softest = tuple(own.softest[joint] if own.softest else _SOFTEST * most for joint in joints)
         stiffest = tuple(own.stiffest[joint] if own.stiffest else most for joint in joints)
         for low, high in zip(softest, stiffest, strict=True):
-            if not low < high:
-                given, names = f"{low:g}, {high:g} N*m/rad", "springs.softest, springs.stiffest"
-                raise ParameterError("must leave each spring a range", field=names, value=given)
+            names, given = "springs.softest, springs.stiffest", f"{low:g}, {high:g} N*m/rad"
+            require(low < high, "must leave each spring a range", names, given)
         return cls(robot, joints, softest, stiffest)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Name of each number of an action."""
-        return (
-            *(f"spring of joint {joint + 1}" for joint in self.joints),
-            *(f"yaw of the {side} leg" for side in SIDES),
-        )
+        springs = (f"spring of joint {joint + 1}" for joint in self.joints)
+        return (*springs, *(f"yaw of the {side} leg" for side in SIDES))
 
     @property
     def moments(self) -> tuple[tuple[float, float, int], ...]:
@@ -97,9 +85,8 @@ class Actions:
         """Copy of actions of shape (len(names),), or (robots, len(names)) for a batch. Raises ParameterError for a
         wrong shape, NaN, or values out of range."""
         array, shape = as_array("action", actions), (*robots, len(self.names))
-        if array.shape != shape:
-            problem = f"must be {shape}, the numbers {', '.join(self.names)}"
-            raise ParameterError(problem, field="action.shape", value=array.shape)
+        problem = f"must be {shape}, the numbers {', '.join(self.names)}"
+        require(array.shape == shape, problem, "action.shape", array.shape)
         inside = np.abs(array) <= 1.0 + _ROUNDING
         if not inside.all():
             place = np.argwhere(~inside)[0].tolist()

@@ -15,8 +15,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from chilopod.engine import engine_named
-from chilopod.engine.arguments import as_seeds
-from chilopod.errors import ParameterError
+from chilopod.engine.arguments import as_seeds, require
 from chilopod.gym.episodes import Episodes, Step
 from chilopod.robot import Robot, load_robot
 
@@ -25,42 +24,41 @@ if TYPE_CHECKING:
 
 Row = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
+Source = str | Path | Robot | None
 
 _PRESETS = {"planar": "aoi2022-planar", "twin": "aoi2022"}
 _RENDER_MODES = ("rgb_array",)
 _FPS = 10  # pictures of a film, each a gait cycle
 
 
-def _without_pictures(env: Any) -> dict[str, Any]:
-    """State of an environment for copies; pictures are drawn again from the episodes."""
-    return {**env.__dict__, "_pictures": None}
+class _Pictured:
+    """Environment with pictures of its robots, which a copy draws again from the episodes."""
+
+    episodes: Episodes
+    render_mode: str | None
+    _pictures: list[Picture] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_pictures": None}
+
+    def _drawn(self) -> list[Pixels]:
+        """Pictures of all robots; none without a render mode."""
+        if self.render_mode is None:
+            return []
+        if self._pictures is None:
+            from chilopod.gym.picture import Picture
+
+            self._pictures = [Picture(self.episodes, robot) for robot in range(self.episodes.count)]
+        return [picture.drawn() for picture in self._pictures]
 
 
-def _drawn(env: Any) -> list[Pixels] | None:
-    """Pictures of all robots; None without a render mode."""
-    if env.render_mode is None:
-        return None
-    if env._pictures is None:
-        from chilopod.gym.picture import Picture
+class RobotVectorEnv(_Pictured, VectorEnv[Row, Row, NDArray[Any]]):
+    """A number of robots with one task, all in one walk of an engine. Raises ParameterError for an unknown robot,
+    engine, task or render mode.
 
-        env._pictures = [Picture(env.episodes, robot) for robot in range(env.episodes.count)]
-    return [picture.drawn() for picture in env._pictures]
-
-
-class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
-    """Robots with one task, all in one walk of an engine. Raises ParameterError for an unknown robot, engine, task or
-    render mode.
-
-    Parameters
-    ----------
-    num_envs
-        Number of robots.
-    robot, engine
-        A preset, a robot file, or a robot, by default the paper's; and an engine's name.
-    render_mode
-        ``rgb_array`` or None.
-    named
-        Arguments of :class:`chilopod.gym.Episodes`: task, springs, patience, disturbance, and fields of the task.
+    The robot is a preset, a robot file, or a robot, by default the paper's; the engine is named, and the render mode is
+    ``rgb_array`` or None. Others are arguments of :class:`chilopod.gym.Episodes`: task, springs, patience, disturbance,
+    and fields of the task.
     """
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -69,7 +67,7 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         self,
         num_envs: int = 1,
         *,
-        robot: str | Path | Robot | None = None,
+        robot: Source = None,
         engine: str = "planar",
         render_mode: str | None = None,
         **named: Any,
@@ -80,9 +78,6 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._generators: list[np.random.Generator] | None = None
-        self._pictures: list[Picture] | None = None
-
-    __getstate__ = _without_pictures
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -110,30 +105,21 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
 
     def render(self) -> tuple[Pixels, ...] | None:
         """Picture of every robot from above; None without a render mode."""
-        drawn = _drawn(self)
-        return None if drawn is None else tuple(drawn)
+        return tuple(self._drawn()) or None
 
 
-class RobotEnv(gymnasium.Env[Row, Row]):
+class RobotEnv(_Pictured, gymnasium.Env[Row, Row]):
     """One robot; the parameters are those of :class:`RobotVectorEnv`."""
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS}  # noqa: RUF012
 
     def __init__(
-        self,
-        *,
-        robot: str | Path | Robot | None = None,
-        engine: str = "planar",
-        render_mode: str | None = None,
-        **named: Any,
+        self, *, robot: Source = None, engine: str = "planar", render_mode: str | None = None, **named: Any
     ) -> None:
         self.render_mode = render_mode
         self.episodes = _episodes(1, robot, engine, render_mode, named)
         self.observation_space, self.action_space = _spaces(self.episodes)
         self._over = False
-        self._pictures: list[Picture] | None = None
-
-    __getstate__ = _without_pictures
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Row, dict[str, Any]]:
         """Begin an episode; with a seed, that of trials with the same seed."""
@@ -145,8 +131,7 @@ class RobotEnv(gymnasium.Env[Row, Row]):
 
     def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
         """Walk for a gait cycle."""
-        if self._over:
-            raise ParameterError("must not follow the end of an episode", field="step", allowed="reset() first")
+        require(not self._over, "must not follow the end of an episode", "step", allowed="reset() first")
         step = self.episodes.step(self.episodes.actions.checked(action)[None])
         terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
         self._over = terminated or truncated
@@ -154,16 +139,12 @@ class RobotEnv(gymnasium.Env[Row, Row]):
 
     def render(self) -> Pixels | None:
         """A picture of the robot, from above; None without a render mode."""
-        drawn = _drawn(self)
-        return None if drawn is None else drawn[0]
+        return next(iter(self._drawn()), None)
 
 
-def _episodes(
-    count: int, robot: str | Path | Robot | None, engine: str, render_mode: str | None, named: dict[str, Any]
-) -> Episodes:
-    if render_mode not in (None, *_RENDER_MODES):
-        allowed = ", ".join(_RENDER_MODES)
-        raise ParameterError("must be one of the render modes", field="render_mode", value=render_mode, allowed=allowed)
+def _episodes(count: int, robot: Source, engine: str, render_mode: str | None, named: dict[str, Any]) -> Episodes:
+    known, allowed = render_mode in (None, *_RENDER_MODES), ", ".join(_RENDER_MODES)
+    require(known, "must be one of the render modes", "render_mode", render_mode, allowed)
     engine_named(engine)
     if robot is None:
         robot = _PRESETS.get(engine, _PRESETS["planar"])
@@ -184,14 +165,12 @@ def _seeds(seed: Any, count: int) -> list[int | None]:
         return [None] * count
     if isinstance(seed, str | bytes) or not isinstance(seed, Sequence | np.ndarray) or not getattr(seed, "ndim", 1):
         return [_whole(seed) + number for number in range(count)]
-    if len(seed) != count:
-        raise ParameterError(f"has the wrong length {len(seed)}", field="seed", allowed=str(count))
+    require(len(seed) == count, f"has the wrong length {len(seed)}", "seed", allowed=str(count))
     return [None if each is None else _whole(each) for each in seed]
 
 
 def _no_options(options: dict[str, Any] | None, more: str = "") -> None:
-    if options:
-        raise ParameterError("must be left out", field="options", value=list(options), allowed=f"none{more}")
+    require(not options, "must be left out", "options", list(options or ()), f"none{more}")
 
 
 def _whole(seed: object) -> int:

@@ -16,12 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod import memory
 from chilopod.engine import Observation, Walk, engine_named
+from chilopod.engine.arguments import require
+from chilopod.engine.contract import Marks
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.frozen import Array
 from chilopod.gym.actions import Actions
 from chilopod.gym.sight import Sight
-from chilopod.gym.tasks import Look, Marks, Task, task_of
+from chilopod.gym.tasks import Look, Task, task_of
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
 from chilopod.steering import CourseReferee, Judged, Verdict
@@ -37,14 +39,9 @@ _SEEDS = 1 << 31  # seeds of episodes without a given one are less than this
 class Step:
     """Result of a step, for every robot of a batch; the arrays are the caller's to keep.
 
-    Attributes
-    ----------
-    observation, reward, terminated, truncated
-        See :class:`chilopod.gym.Sight` and :class:`chilopod.gym.Task`; the reward of a robot whose episode has just
-        begun is 0.
-    info
-        ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad), ``verdict`` on
-        the target that ended in this step, or "", and ``arrived``: number of targets reached so far.
+    See :class:`chilopod.gym.Sight` and :class:`chilopod.gym.Task`; the reward of a robot whose episode has just begun
+    is 0. The info has ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad),
+    ``verdict`` on the target that ended in this step, or "", and ``arrived``: number of targets reached so far.
     """
 
     observation: NDArray[np.float32]
@@ -83,14 +80,9 @@ class Episodes:
     disturbance
         Disturbance of the start and of bearings, as in trials.
     remember
-        True to keep :attr:`moments`.
+        True to keep ``moments`` of the steps so far, as many as the longest episode has.
 
-    Attributes
-    ----------
-    actions, sight, period
-        Meaning of actions and of observations, and length of a step, s.
-    moments
-        Moments of the steps so far, as many as the longest episode has.
+    ``actions`` and ``sight`` are the meaning of actions and of observations, and ``period`` is the length of a step, s.
     """
 
     def __init__(
@@ -108,8 +100,7 @@ class Episodes:
     ) -> None:
         self.task = task_of(task, chosen)
         self.count = checked_count("num_envs", count, _MOST)
-        if not isinstance(disturbance, Disturbance):
-            raise ParameterError("must be a Disturbance", field="disturbance", value=disturbance)
+        require(isinstance(disturbance, Disturbance), "must be a Disturbance", "disturbance", disturbance)
         disturbance.check_foot(robot.body.modules)
         self._name, self._engine = engine, engine_named(engine)
         self._engine.common(robot)
@@ -119,16 +110,14 @@ class Episodes:
         common = self.task.course(0, self._patience)
         self.sight = Sight(self.actions, common.range)
         gait, least = robot.gait, self.task.farthest / robot.gait.speed
-        if self._patience < least:
-            problem, allowed = "must be long enough to reach the farthest target", f"{least:g} s or more"
-            raise ParameterError(problem, field="patience", value=f"{self._patience:g} s", allowed=allowed)
+        problem, allowed = "must be long enough to reach the farthest target", f"{least:g} s or more"
+        require(self._patience >= least, problem, "patience", f"{self._patience:g} s", allowed)
         self.period = gait.period
         self._looks = int(np.ceil(common.duration / gait.period)) + len(common.goals) + 1
-        needed = _A_LOOK * self._looks * self.count
-        if needed > memory.available():
-            problem, asked = f"would take {memory.in_words(needed)} of memory", f"{self.count} * {common.duration:g} s"
-            allowed = f"fewer or shorter episodes: {memory.in_words(memory.available())} are free"
-            raise ParameterError(problem, field="num_envs * targets * patience", value=asked, allowed=allowed)
+        needed, free = _A_LOOK * self._looks * self.count, memory.available()
+        problem, asked = f"would take {memory.in_words(needed)} of memory", f"{self.count} * {common.duration:g} s"
+        allowed = f"fewer or shorter episodes: {memory.in_words(free)} are free"
+        require(needed <= free, problem, "num_envs * targets * patience", asked, allowed)
         self.moments: deque[Moment] | None = deque(maxlen=self._looks) if remember else None
         self._walk: Walk | None = None
         self._generators: list[np.random.Generator] = []
@@ -179,8 +168,7 @@ class Episodes:
         drawn, courses, start = self._drawn(np.arange(self.count), seeds)
         self._walk = self._engine.start(self.robot, record=None, **start)
         missed = np.stack([each.missed for each in drawn])
-        self._missing = bool(self._disturbance.missed)
-        self._referee = CourseReferee(courses, self.robot.gait, missed if self._missing else None, keep=False)
+        self._referee = CourseReferee(courses, self.robot.gait, missed, keep=False)
         self._errors = np.stack([each.bearing for each in drawn])
         self._cycle, self._since = 0, np.zeros(self.count, dtype=np.intp)
         self._away, self._arrived = np.full(self.count, np.nan), np.zeros(self.count, dtype=np.intp)
@@ -192,8 +180,7 @@ class Episodes:
         ids = np.flatnonzero(which)
         drawn, courses, start = self._drawn(ids, [None] * len(ids))
         walk.restart(which, **start)
-        missed = np.stack([each.missed for each in drawn])
-        self._referee.restart(which, courses, missed if self._missing else None)
+        self._referee.restart(which, courses, np.stack([each.missed for each in drawn]))
         self._errors[ids] = np.stack([each.bearing for each in drawn])
         self._since[ids], self._arrived[ids] = self._cycle, 0
 
@@ -220,11 +207,8 @@ class Episodes:
         if others.any():
             # A robot without further targets shows the last one again.
             again = walk.observe()
-            seen = replace(
-                seen,
-                bearing=np.where(others, again.bearing, seen.bearing),
-                distance=np.where(others, again.distance, seen.distance),
-            )
+            bearing = np.where(others, again.bearing, seen.bearing)
+            seen = replace(seen, bearing=bearing, distance=np.where(others, again.distance, seen.distance))
         look = Look(judged, busy, self._away - away, left, self.period, self.robot.gait.speed)
         reward = self._rewarded(look, fresh)
         self._away = np.where(others, _distance(aims, pose), away)
@@ -237,23 +221,18 @@ class Episodes:
             walk.halt(self._ended)
         if self.moments is not None:
             self.moments.append(Moment(pose, seen.joint_angles, seen.leg_yaw, seen.stiffness, aims))
-        info = {
-            "time": (self._cycle - self._since) * self.period,
-            "distance": self._away.copy(),
-            "pose": pose,
-            "verdict": _verdicts(judged),
-            "arrived": self._arrived.copy(),
-        }
+        time = (self._cycle - self._since) * self.period
+        info = {"time": time, "distance": self._away.copy(), "pose": pose, "verdict": _verdicts(judged)}
+        info["arrived"] = self._arrived.copy()
         return Step(self.sight.row(self._through(seen)), reward, terminated, truncated, info)
 
     def _rewarded(self, look: Look, fresh: Marks) -> Array:
         """Reward of the task, checked: one finite number for each robot, 0 where an episode has just begun."""
         reward = np.asarray(self.task.reward(look), dtype=np.float64)
-        if reward.shape != look.left.shape:
-            raise ParameterError("must give one reward for each robot", field="reward", value=f"shape {reward.shape}")
+        fits = reward.shape == look.left.shape
+        require(fits, "must give one reward for each robot", "reward", f"shape {reward.shape}")
         reward = np.where(fresh, 0.0, reward)
-        if not np.isfinite(reward).all():
-            raise ParameterError("must give finite rewards", field="reward", value=reward)
+        require(np.isfinite(reward).all(), "must give finite rewards", "reward", reward)
         return reward
 
     def _through(self, seen: Observation) -> Observation:
@@ -266,17 +245,12 @@ class Episodes:
 
 
 def _distance(places: Array, pose: Array) -> Array:
-    away: Array = np.hypot(places[:, 0] - pose[:, 0], places[:, 1] - pose[:, 1])
-    return away
+    return np.asarray(np.hypot(places[:, 0] - pose[:, 0], places[:, 1] - pose[:, 1]))
 
 
 def _verdicts(judged: Judged) -> NDArray[np.str_]:
     verdicts = np.full(len(judged.gone), "", dtype="U12")
-    for which, verdict in (
-        (judged.arrived, Verdict.ARRIVED),
-        (judged.late, Verdict.LATE),
-        (judged.unseen, Verdict.UNSEEN),
-        (judged.gone, Verdict.STOPPED),
-    ):
-        verdicts[which] = verdict.label
+    which = judged.arrived, judged.late, judged.unseen, judged.gone
+    for marks, verdict in zip(which, (Verdict.ARRIVED, Verdict.LATE, Verdict.UNSEEN, Verdict.STOPPED), strict=True):
+        verdicts[marks] = verdict.label
     return verdicts

@@ -41,10 +41,11 @@ class Picture:
             return np.full((SIZE, SIZE, 3), 255, dtype=np.uint8)
         frames, aims = self._frames(past), _aims([each.aims[self._robot] for each in past], self._episodes.period)
         floor, springs = self._floor(frames, aims), np.stack([each.stiffness[self._robot, None] for each in past])
+        scene = Scene(frames, floor, ("",), (Outcome("", "ended", np.inf),), (aims,), ARRIVAL_RADIUS, springs)
         if self._drawn != (floor, aims):
-            self._lay(Scene(frames, floor, ("",), (Outcome("", "ended", np.inf),), (aims,), ARRIVAL_RADIUS, springs))
+            self._lay(scene)
             self._drawn = floor, aims
-        self._panel.shown = Scene(frames, floor, ("",), (self._panel.outcome,), (aims,), ARRIVAL_RADIUS, springs)
+        self._panel.shown = scene
         self._canvas.restore_region(self._background)
         for artist in self._panel.placed(len(frames.time) - 1):
             artist.draw(self._canvas.get_renderer())

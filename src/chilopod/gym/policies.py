@@ -53,19 +53,12 @@ class Steered:
 
 
 def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
-    """A strategy of :data:`chilopod.steering.ON_COURSES` as a policy.
+    """A strategy of :data:`chilopod.steering.ON_COURSES` as a policy: ``leg-yaw``, the paper's controller with constant
+    springs, or ``variable``, which also sets the first spring, by a radius law of the engine, see
+    :func:`chilopod.tasks.radius_law`.
 
-    Parameters
-    ----------
-    name, episodes
-        ``leg-yaw``: the paper's controller with constant springs; or ``variable``, which also sets the first spring.
-    engine
-        Engine of the radius law of ``variable``, see :func:`chilopod.tasks.radius_law`.
-
-    Raises
-    ------
-    ParameterError, AnalysisError
-        For an unknown name, or if the strategy needs a radius law and the robot has none.
+    Raises ParameterError or AnalysisError for an unknown name, or if the strategy needs a radius law and the robot has
+    none.
     """
     strategy = strategy_named(name, BASELINES)
     law = radius_law(episodes.robot, engine) if strategy.needs_law else None

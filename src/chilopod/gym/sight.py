@@ -67,11 +67,6 @@ class Sight:
         known, (first, legs) = row[:, 0] > 0.5, (4, 4 + joints)
         stiffness = np.tile(self.actions.robot.springs.stiffness, (len(row), 1))
         stiffness[:, self.actions.joints] = self.actions.stiffness(row[:, legs + 2 :])
-        return Observation(
-            time,
-            np.where(known, np.arctan2(row[:, 1], row[:, 2]), np.nan),
-            np.where(known, row[:, 3], np.nan),
-            row[:, first:legs],
-            row[:, legs : legs + 2],
-            stiffness,
-        )
+        bearing = np.where(known, np.arctan2(row[:, 1], row[:, 2]), np.nan)
+        distance = np.where(known, row[:, 3], np.nan)
+        return Observation(time, bearing, distance, row[:, first:legs], row[:, legs : legs + 2], stiffness)

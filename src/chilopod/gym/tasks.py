@@ -7,16 +7,14 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chilopod.engine.arguments import as_number
+from chilopod.engine.arguments import as_number, require
+from chilopod.engine.contract import Marks
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.flows.arguments import checked_count
 from chilopod.frozen import Array
 from chilopod.steering import Course, Goal, Judged, Target, random_course
 from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
-
-Marks = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -34,21 +32,17 @@ class Rewards:
 
     def __post_init__(self) -> None:
         for each in fields(self):
-            if not np.isfinite(as_number(each.name, getattr(self, each.name))):
-                raise ParameterError("must be finite", field=each.name, value=getattr(self, each.name))
+            value = getattr(self, each.name)
+            require(np.isfinite(as_number(each.name, value)), "must be finite", each.name, value)
 
 
 @dataclass(frozen=True)
 class Look:
     """State of a batch at the end of a step, as a task judges it; arrays have the shape (robots,).
 
-    Attributes
-    ----------
-    judged, busy
-        Masks of the robots whose target ended, and of those that have another one.
-    nearer, left, period, speed
-        Progress towards the target, m, NaN for robots without one; time left for all targets and length of a step, s;
-        speed of the straight walk without slip, m/s.
+    ``judged`` and ``busy`` are masks of the robots whose target ended, and of those that have another one; ``nearer``
+    is the progress towards the target, m, NaN for robots without one; ``left`` and ``period`` are the time left for all
+    targets and the length of a step, s, and ``speed`` that of the straight walk without slip, m/s.
     """
 
     judged: Judged
@@ -66,8 +60,7 @@ class Task:
     rewards: Rewards = Rewards()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.rewards, Rewards):
-            raise ParameterError("must be a Rewards", field="rewards", value=self.rewards)
+        require(isinstance(self.rewards, Rewards), "must be a Rewards", "rewards", self.rewards)
 
     @property
     def farthest(self) -> float:
@@ -121,8 +114,7 @@ class OneTarget(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.target, Target):
-            raise ParameterError("must be a Target", field="target", value=self.target)
+        require(isinstance(self.target, Target), "must be a Target", "target", self.target)
 
     @property
     def farthest(self) -> float:
@@ -155,8 +147,7 @@ def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
         nearest, allowed = nearest_name(str(task), TASKS), f"{', '.join(TASKS)}, or a chilopod.gym.Task"
         raise ParameterError("must be one of the tasks", field="task", value=task, allowed=allowed, nearest=nearest)
     names = [each.name for each in fields(found)]
-    for name in chosen.keys() - names:
+    for name, value in chosen.items():
         problem, known = f"must be a field of {type(found).__name__} or an argument", (*names, *_ARGUMENTS)
-        near, value = nearest_name(name, known), chosen[name]
-        raise ParameterError(problem, field=name, value=value, allowed=", ".join(known), nearest=near)
+        require(name in names, problem, name, value, ", ".join(known), nearest_name(name, known))
     return replace(found, **chosen)

@@ -72,9 +72,6 @@ def _rods(tops: Array, ends: Array, radius: float) -> Placed:
     length = np.linalg.norm(way, axis=-1)
     x, y, z = (way / length[:, None]).T
     turn = np.stack([1.0 + z, -y, x, np.zeros_like(x)], axis=-1)
+    turn /= np.linalg.norm(turn, axis=-1, keepdims=True)
     thick = np.full_like(length, radius)
-    return Placed(
-        0.5 * (tops + ends),
-        turn / np.linalg.norm(turn, axis=-1, keepdims=True),
-        np.stack([thick, thick, length], axis=-1),
-    )
+    return Placed(0.5 * (tops + ends), turn, np.stack([thick, thick, length], axis=-1))

@@ -213,9 +213,8 @@ class Gate:
             kind = _KINDS[read["type"]]
             fields = {"type", *(each.name for each in dataclasses.fields(kind))}
             # Types are those that viser gives; any float is one of them.
-            offered = (
-                fields.issuperset(read) and _bounded(read) and self._offers(connection, msgspec.convert(read, kind))
-            )
+            known = fields.issuperset(read) and _bounded(read)
+            offered = known and self._offers(connection, msgspec.convert(read, kind))
         except (ValueError, TypeError, LookupError, RecursionError):
             offered = False
         if not offered:
@@ -372,9 +371,8 @@ def _scripts() -> str:
     digits = {digit: place for place, digit in enumerate(sorted({*map(chr, range(33, 127))} - {*"\"&'<>`"}))}
     packed = bytearray()
     try:
-        ((text, styles, unpacking),) = re.findall(
-            r'<script data-p="([^"]*)" data-ss="(\d+)"[^>]*>(.*?)</script>', page, re.DOTALL
-        )
+        pattern = r'<script data-p="([^"]*)" data-ss="(\d+)"[^>]*>(.*?)</script>'
+        ((text, styles, unpacking),) = re.findall(pattern, page, re.DOTALL)
         for start in range(0, len(text), 5):
             number, five = 0, text[start : start + 5]
             for digit in five:

@@ -129,15 +129,14 @@ def _branches(theory: Theory, bends: Array, place: _Place) -> list[str]:
         if each.stable is not None and end[0] > x:
             parts.append(_line([(x, y), end], STABLE if each.stable else UNSTABLE))
         if each.begins and each.stable is not before and each.low < place.stiffest:
-            way, right = f"{each.begins} {_in_unit(each.low):.3g}", x < 0.7 * _RIGHT
+            way, right = f"{each.begins} {units.from_si(each.low, PAPER_UNIT):.3g}", x < 0.7 * _RIGHT
             parts.append(_text(x + 6.0 if right else x - 6.0, y - 7.0, way, "start" if right else "end"))
         before = each.stable
-    # Branches are on the left, and the words beside them on the right.
-    x, anchor, letters = (
-        (0.5 * (_LEFT + _RIGHT), "middle", _LETTERS) if theory.pitchfork is None else (_RIGHT, "end", _BESIDE)
-    )
-    rows = wrap(theory.remark, letters)
-    y = _TOP + 26.0 if theory.pitchfork is None else _BOTTOM - 7.0 - 14.0 * len(rows)
+    if theory.pitchfork is None:
+        rows, x, y, anchor = wrap(theory.remark, _LETTERS), 0.5 * (_LEFT + _RIGHT), _TOP + 26.0, "middle"
+    else:  # branches are on the left, and the words beside them on the right
+        rows, x, anchor = wrap(theory.remark, _BESIDE), _RIGHT, "end"
+        y = _BOTTOM - 7.0 - 14.0 * len(rows)
     parts += [_text(x, y + 14.0 * row, escape(line), anchor) for row, line in enumerate(rows)]
     for side in (1.0, -1.0):
         points = [place(*each) for each in zip(theory.springs, side * bends, strict=True)]
@@ -152,7 +151,7 @@ def _axes(place: _Place) -> list[str]:
         if abs(bend) <= place.most:
             y = place(0.0, bend)[1]
             parts += [_grid(_LEFT, y, _RIGHT, y), _text(_LEFT - 4.0, y + 4.0, f"{bend}°".replace("-", "−"), "end")]
-    widest = _in_unit(place.stiffest)
+    widest = units.from_si(place.stiffest, PAPER_UNIT)
     step = 10.0 ** np.floor(np.log10(widest))
     for spring in np.arange(0.0, widest + 1e-9, step if widest > 3.0 * step else 0.5 * step):
         x = _LEFT + (_RIGHT - _LEFT) * spring / widest
@@ -164,10 +163,6 @@ def _axes(place: _Place) -> list[str]:
         _text(_RIGHT, _BOTTOM - 5.0, "bent to the right", "end"),
     ]
     return parts
-
-
-def _in_unit(spring: float) -> float:
-    return units.from_si(spring, PAPER_UNIT)
 
 
 def _line(points: list[tuple[float, float]], look: str) -> str:
@@ -189,9 +184,8 @@ def from_above(placed: Mapping[str, Placed], length: float, words: str) -> bytes
     parts = []
     for kind, color in (("box", SCENE["body"]), ("ball", SCENE["ink"])):
         here = placed[kind]
-        for index, ((x, y, _), (w, _, _, z), (along, across, _)) in enumerate(
-            zip(here.centres, here.turns, here.scales, strict=True)
-        ):
+        each = zip(here.centres, here.turns, here.scales, strict=True)
+        for index, ((x, y, _), (w, _, _, z), (along, across, _)) in enumerate(each):
             place = f"{_ABOVE[0] / 2 + zoom * (x - middle[0]):.1f} {0.4 * _ABOVE[1] - zoom * (y - middle[1]):.1f}"
             turn, a, b = -np.rad2deg(2.0 * np.arctan2(z, w)), zoom * along, zoom * across
             fill = SCENE["edge"] if kind == "box" and index == 0 else color

@@ -22,12 +22,10 @@ def free_port(host: str, port: int) -> int:
         with socket.socket(family, socket.SOCK_STREAM) as trial:
             trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             trial.bind(address)
-            free: int = trial.getsockname()[1]
-            return free
+            return int(trial.getsockname()[1])
     except (OSError, UnicodeError) as error:
         if not isinstance(error, OSError) or isinstance(error, socket.gaierror) or error.errno == errno.EADDRNOTAVAIL:
             problem, allowed = "must be an address of this machine", "an address or a name of it, or 0.0.0.0 for all"
             raise ParameterError(problem, field="host", value=host, allowed=allowed) from error
-        raise ParameterError(
-            f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
-        ) from error
+        problem = f"cannot be listened at: {error.strerror}"
+        raise ParameterError(problem, field="port", value=port, allowed="another --port, or 0") from error

@@ -79,11 +79,9 @@ def read(asked: str, sliders: Mapping[str, Slider]) -> tuple[list[wishes.Wish], 
             elif key == "robot" and text not in PRESETS:
                 raise ParameterError("must be a preset", field=key, value=text[:_LONGEST], allowed=", ".join(PRESETS))
             elif key != "robot" and key not in _OTHERS:
-                key = key[:_LONGEST]
+                key, known = key[:_LONGEST], ", ".join(allowed)
                 near = nearest_name(key, allowed)
-                raise ParameterError(
-                    "must be a setting", field=key, value=text[:_LONGEST], allowed=", ".join(allowed), nearest=near
-                )
+                raise ParameterError("must be a setting", field=key, value=text[:_LONGEST], allowed=known, nearest=near)
         except ParameterError as error:
             wrong.append(str(error))
     # The walk begins anew with everything else as it is asked for.

@@ -51,35 +51,17 @@ _ALONE = 0.1  # s from one look to the next while no browser watches
 class Live:
     """A page with a walking robot, which stands still while no browser watches.
 
-    Parameters
-    ----------
-    robot, engine, seed, strategy
-        As for :class:`chilopod.live.Session`.
-    host, port
-        Address and port to listen at; 0 for any port that is free. At other addresses than this machine's own a browser
-        needs the token in :attr:`address`.
-    token
-        True if a browser needs a token on this machine too.
-    kept
-        Function of the name of a recording and its two files, netCDF and HTML, besides the download in the browser; its
-        errors are shown at the page.
+    The robot is that of a :class:`chilopod.live.Session`. The page listens at a host and a port, 0 for any port that is
+    free; at other addresses than this machine's own a browser needs the token in ``address``, the link to open, and
+    with ``token`` on this machine too. ``kept`` is a function of the name of a recording and its two files, netCDF and
+    HTML, besides the download in the browser; its errors are shown at the page.
 
-    Attributes
-    ----------
-    address
-        Link to open in a browser, with the token if one is needed.
-    gate, undelivered
-        Checks that count what they refused; names and files of recordings that neither ``kept`` nor a browser took.
-    seen, frames, busy, failure
-        The last frame, the number of frames that were shown, the time for which the walk's thread worked, s, and the
-        error that ended it, if one did.
+    ``gate`` has checks that count what they refused, and ``undelivered`` names and files of recordings that neither
+    ``kept`` nor a browser took. ``seen`` is the last frame, ``frames`` the number of frames that were shown, ``busy``
+    the time for which the walk's thread worked, s, and ``failure`` the error that ended it, if one did.
 
-    Raises
-    ------
-    ParameterError
-        If the port is in use or there is no such address, or the engine cannot walk such a robot.
-    ExtraError
-        If viser is not installed.
+    Raises ParameterError if the port is in use or there is no such address, or the engine cannot walk such a robot;
+    ExtraError if viser is not installed.
     """
 
     def __init__(
@@ -300,7 +282,8 @@ class Live:
         before.stop_recording()
         self._keep()
         self.preset, self._challenge = name, None
-        at_server(self.server, self._clear)
+        for part in (self.server.gui, self.server.scene):
+            at_server(self.server, part.reset)
         self._compile(robot, engine)
         self.session = Session(robot, engine, seed=before.settings.seed, strategy=before.first.strategy)
         self.session.settings = replace(self.session.settings, strategy=before.settings.strategy)
@@ -327,10 +310,6 @@ class Live:
         if self._challenge:
             self._challenge.answer(given, self.seen, self._theory)
 
-    def _clear(self) -> None:
-        self.server.gui.reset()
-        self.server.scene.reset()
-
     def _query(self) -> str:
         """Part of an address that leads to the present settings."""
         return query(self.session.settings, self.session.first, self.session.sliders, self.preset)
@@ -346,9 +325,8 @@ class Live:
             self.choose(preset)
         session, (told, wrong) = self.session, read(asked, self.session.sliders)
         if told or preset is not None:  # what an address leaves out is as in the file and its preset
-            file = [
-                wishes.Set(row.name, row.read(session.first)) for row in session.sliders.values() if row.name != ALL
-            ]
+            rows = (row for row in session.sliders.values() if row.name != ALL)
+            file = [wishes.Set(row.name, row.read(session.first)) for row in rows]
             steering = wishes.Steering(session.first.strategy)
             told = [*file, steering, *read(PRESETS[self.preset].settings, session.sliders)[0], *told]
         for wish in told:

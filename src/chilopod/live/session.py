@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from chilopod.analysis.parameters import ALL
 from chilopod.engine import Command, Controller, Status, Walk, engine_named, steer
+from chilopod.engine.arguments import require
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.live import wishes
@@ -57,30 +57,14 @@ class Session:
     Springs and pulls change at once (or as fast as the actuators of the robot file allow), the floor and the steps at
     the beginning of the next gait cycle.
 
-    Parameters
-    ----------
-    robot
-        The robot; all of its springs may be changed here.
-    engine
-        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
-    seed
-        Seed of start and nudges.
-    strategy
-        Name of one of :data:`chilopod.steering.ON_THE_WAY`.
+    All springs of the robot may be changed here. The engine is one of :data:`chilopod.engine.ENGINES`, or one's own as
+    ``package.module:object``; the seed is that of start and nudges, and the strategy the name of one of
+    :data:`chilopod.steering.ON_THE_WAY`. Raises ParameterError if the engine cannot walk such a robot, or there is no
+    such strategy.
 
-    Attributes
-    ----------
-    box, settings, first
-        Wishes from any thread, those that were granted, and what was set at first.
-    file, sliders
-        The robot as it was given, with springs that can all be changed, and its sliders by name.
-    law
-        Radius law of the springs, which strategies need; None while it is not known.
-
-    Raises
-    ------
-    ParameterError
-        If the engine cannot walk such a robot, or there is no such strategy.
+    ``box`` has wishes from any thread, ``settings`` those that were granted, and ``first`` what was set at first.
+    ``file`` is the robot as it was given, with springs that can all be changed, and ``sliders`` are its sliders by
+    name. ``law`` is the radius law of the springs, which strategies need; None while it is not known.
     """
 
     def __init__(self, robot: Robot, engine: str = "planar", *, seed: int = 1, strategy: str = VARIABLE.name) -> None:
@@ -121,8 +105,7 @@ class Session:
 
     def messages(self) -> list[str]:
         """Messages about events since the last call."""
-        sentences = list(self._messages)
-        self._messages.clear()
+        sentences, self._messages = list(self._messages), deque(maxlen=_MOST_WORDS)
         return sentences
 
     def records(self) -> list[xr.Dataset]:
@@ -172,10 +155,9 @@ class Session:
     def _begin(self) -> None:
         """Put the robot on the floor anew."""
         robot, joints = self.settings.robot, self.settings.robot.body.modules - 1
-        self._random = np.random.default_rng(self.settings.seed)
-        states = self._engine.initial_states(
-            robot, self._random.normal(0.0, _START.joint_angle, joints), self._random.normal(0.0, _START.heading)
-        )
+        self._random = random = np.random.default_rng(self.settings.seed)
+        bends = random.normal(0.0, _START.joint_angle, joints)
+        states = self._engine.initial_states(robot, bends, random.normal(0.0, _START.heading))
         self._before, self._reached = 0.0, 0.0
         self._target: tuple[float, float] | None = None
         self._steering = ""
@@ -194,16 +176,14 @@ class Session:
         return bool(begin > 0 and len(left) - end <= end - begin)
 
     def _start(self, robot: Robot, states: Array) -> None:
-        if self.settings.recording and not (self._recorded < _MOST_RECORDS and self._bytes < _MOST_BYTES):
+        if self.settings.recording and (self._recorded >= _MOST_RECORDS or self._bytes >= _MOST_BYTES):
             self.settings = replace(self.settings, recording=False)
             self._messages.append(f"recording has ended: there is room for no more than the {self._recorded} so far")
         self._written = self._has_record = self.settings.recording
-        self._walk: Walk = self._engine.start(
-            [robot],
-            initial=states,
-            seeds=[self.settings.seed] if self._engine.traits.noisy else None,
-            record=Recording(_RATE, poses=self._engine.traits.poses) if self._has_record else None,
-        )
+        traits = self._engine.traits
+        seeds = [self.settings.seed] if traits.noisy else None
+        record = Recording(_RATE, poses=traits.poses) if self._has_record else None
+        self._walk: Walk = self._engine.start([robot], initial=states, seeds=seeds, record=record)
         self._look_next = 1
 
     def _go(self, until: float) -> None:
@@ -243,8 +223,7 @@ class Session:
     def _continue(self, robot: Robot) -> None:
         """Walk on from here with another floor, other steps, or another record."""
         self._keep_record()
-        seen = self._walk.observe()
-        states = self._walk.states()
+        seen, states = self._walk.observe(), self._walk.states()
         self._before += self._walk.time
         for joint, value in enumerate(seen.stiffness[0].tolist()):
             robot = robot.with_value(f"{ALL}[{joint}]", value)
@@ -271,7 +250,9 @@ class Session:
         self._walk.command(Command(stiffness=[self.settings.robot.springs.stiffness]))
 
     def _let_go(self) -> None:
-        """Walk without a target, with the springs as set and straight legs."""
+        """Walk without a target, if there is one, with the springs as set and straight legs."""
+        if self._target is None:
+            return
         self._target, self._controller, self._steering = None, None, ""
         self._walk.aim((np.nan, np.nan))
         self._walk.command(Command(leg_yaw=[(0.0, 0.0)], within=self._period))
@@ -327,16 +308,13 @@ class Session:
 
     def _aim(self, place: tuple[float, float] | None, by_hand: bool = False) -> None:
         if place is None:
-            if self._target is not None:
-                self._let_go()
+            self._let_go()
             return
-        if np.shape(place) != (2,):
-            raise ParameterError("must be a place on the floor", field="target", value=place, allowed="(x, y), m")
+        require(np.shape(place) == (2,), "must be a place on the floor", "target", place, "(x, y), m")
         x, y = (as_finite("target", each) for each in place)
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
         controller, steering = (None, "") if by_hand else self._steered()
-        if self._target is not None:
-            self._let_go()
+        self._let_go()
         self._target, self._controller, self._steering = (x, y), controller, steering
         self._reached = self._before + self._walk.time
         self._walk.aim(self._target)
@@ -351,10 +329,8 @@ class Session:
 
     def _pull_at(self, joint: int, torque: float, time: float) -> None:
         own = self.file.springs.stiffness
-        if joint not in range(len(own)):
-            given: Any = joint
-            given = given + 1 if isinstance(given, int) else given
-            raise ParameterError("must be a joint", field="joint", value=given, allowed=f"1 to {len(own)}")
+        known, given = joint in range(len(own)), joint + 1 if type(joint) is int else joint
+        require(known, "must be a joint", "joint", given, f"1 to {len(own)}")
         strongest = _STRONGEST * own[joint]
         torque, time = as_finite("pull", torque), time if time == math.inf else as_finite("time", time)
         self._pull[joint] = np.clip(torque, -strongest, strongest)

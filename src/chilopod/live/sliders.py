@@ -118,12 +118,10 @@ def _springs(file: Robot) -> list[Slider]:
     keys = (("Z", "First spring softer"), ("X", "First spring stiffer"))
     hint = "Stiffness of joint 1 (the paper's k1), N·mm/deg"
     first = replace(first, label="first spring", hint=hint, keys=keys)
-    keys, hint = (
-        (("Z", "All springs softer"), ("X", "All springs stiffer")),
-        "Stiffness of all joints (their mean), N·mm/deg",
-    )
-    together = Slider(ALL, "k", "all springs", hint, **look, **_of_robot(ALL), keys=keys, shift=True)
-    together = replace(together, read=lambda settings: float(np.mean(settings.robot.springs.stiffness)))
+    keys = (("Z", "All springs softer"), ("X", "All springs stiffer"))
+    hint = "Stiffness of all joints (their mean), N·mm/deg"
+    look |= _of_robot(ALL) | {"read": lambda settings: float(np.mean(settings.robot.springs.stiffness))}
+    together = Slider(ALL, "k", "all springs", hint, **look, keys=keys, shift=True)
     return [first, together, *(replace(row, folder="Each spring (N·mm/deg)") for row in others)]
 
 

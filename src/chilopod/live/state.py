@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from chilopod.engine import Status
-from chilopod.errors import ParameterError
+from chilopod.engine.arguments import require
 from chilopod.frozen import Array
 from chilopod.live.wishes import LARGEST_SEED
 from chilopod.robot import Robot
@@ -61,8 +61,8 @@ def but_springs(robot: Robot) -> tuple[object, ...]:
 def as_seed(seed: object) -> int:
     """A whole number, 0 to :data:`chilopod.live.wishes.LARGEST_SEED`; a ParameterError if it is not."""
     number = as_finite("seed", seed)
-    if number != int(number) or not 0 <= number <= LARGEST_SEED:
-        raise ParameterError("must be a whole number", field="seed", value=seed, allowed=f"0 to {LARGEST_SEED}")
+    whole = number == int(number) and 0 <= number <= LARGEST_SEED
+    require(whole, "must be a whole number", "seed", seed, f"0 to {LARGEST_SEED}")
     return int(number)
 
 
@@ -72,8 +72,7 @@ def as_finite(field: str, value: object) -> float:
         number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
     except OverflowError:  # an int may have any number of digits
         number = math.inf
-    if not math.isfinite(number):
-        raise ParameterError("must be a finite number", field=field, value=value)
+    require(math.isfinite(number), "must be a finite number", field, value)
     return number
 
 
@@ -81,6 +80,6 @@ def as_within(field: str, value: object, limits: tuple[float, float], unit: str)
     """Checked number between two others; a ParameterError names the field and the allowed range."""
     number, (low, high) = as_finite(field, value), limits
     # The ends of a slider are those of its range up to round-off.
-    if not low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9):
-        raise ParameterError("is out of range", field=field, value=value, allowed=f"{low:g} to {high:g} {unit}".strip())
+    fits = low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9)
+    require(fits, "is out of range", field, value, f"{low:g} to {high:g} {unit}".strip())
     return number

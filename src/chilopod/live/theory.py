@@ -98,7 +98,7 @@ def theory_of(robot: Robot, engine: str, springs: tuple[float, float], callback:
     known = Theory(robot, computing=True)
     try:
         if engine_named(engine).traits.exact:
-            _exact(known, springs, callback)
+            _exact(robot, known, springs, callback)
         else:
             from chilopod.tasks import radius_law
 
@@ -127,13 +127,11 @@ def straight_walks(robot: Robot, springs: tuple[float, float]) -> tuple[Stretch,
     )
 
 
-def _exact(known: Theory, springs: tuple[float, float], callback: Callable[[Theory], None]) -> None:
+def _exact(robot: Robot, known: Theory, springs: tuple[float, float], callback: Callable[[Theory], None]) -> None:
     from chilopod.analysis import curved_walks, first_loss
     from chilopod.stability import Kind
     from chilopod.tasks.radius_law import that_holds
 
-    robot = known.robot
-    assert robot is not None
     # As the radius law has it, but for the first spring, which is what varies.
     low, high = (part * max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]) for part in _BETWEEN)
     callback(replace(known, remark="computing the pitchfork"))
@@ -147,13 +145,9 @@ def _exact(known: Theory, springs: tuple[float, float], callback: Callable[[Theo
     callback(_following(known, 0.0))
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=lambda done, _: callback(_following(known, done)))
     possible = walks.verdict.values != Status.OUT_OF_RANGE.label
-    known = replace(
-        known,
-        springs=walks.parameter_si.values[possible],
-        radii=walks.axis_radius.values[possible],
-        stable=walks.stable.values[possible],
-        computing=False,
-    )
+    found = walks.parameter_si, walks.axis_radius, walks.stable
+    bent, radii, stable = (each.values[possible] for each in found)
+    known = replace(known, springs=bent, radii=radii, stable=stable, computing=False)
     try:
         law = RadiusLaw.of_branch(known.springs, known.radii, known.stable, robot.unit_of(K1))
         known = replace(known, law=that_holds(law, robot))

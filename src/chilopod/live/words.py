@@ -88,9 +88,8 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
         return f"Settled on {arc}; the branch of curved walks has {settled:.2f} m. {soft}."
     if not bent:
         speed = f" by {_percent(growth)} a second" if growth and growth.rate > 0.0 else ""
-        return (
-            f"{soft}: the straight walk is unstable, and the smallest bend grows{speed}, to {settled:.2f} m in the end."
-        )
+        grows = f"the smallest bend grows{speed}, to {settled:.2f} m in the end"
+        return f"{soft}: the straight walk is unstable, and {grows}."
     return f"{soft}. The curve, {radius:.2f} m to the {side}, {_moving(radius, settled, seen)}."
 
 

@@ -149,7 +149,7 @@ def _steered(
         raise AnalysisError(problem, field=f"engine {first.engine}")
     noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
-    referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
+    referee = CourseReferee(courses, first.robot.gait, missed) if courses else None
     steer(walk, until, first.controller, bearing_noise=noise, referee=referee, progress=progress, heard=heard)
     return walk, drawn, referee
 
@@ -180,30 +180,30 @@ def _changed(trial: Trial) -> bool:
 
 
 def _doubts(trial: Trial) -> str:
-    """Reason why a controller's walks are not reproducible, if so: its first gait cycle is walked twice, once in each
-    process, and among other robots."""
-    if not _is_own(trial):
-        return ""
+    """Reason why a controller's walks are not reproducible, if so."""
     who = _who(trial)
-    if who not in _KNOWN:
-        cycle = min(trial.robot.gait.period, trial.duration)
-        beside = replace(trial, seed=trial.seed + 1, joint_angles=() if any(trial.joint_angles) else (_OTHERWISE,))
-        if isinstance(trial.target, Target):
-            beside = replace(beside, target=Target(-0.5 * trial.target.bearing, trial.target.distance))
-        one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
-        try:
-            among = _steered([beside, trial, beside], cycle)[0].to_dataset()
-        except ChilopodError as error:  # of a controller for one robot alone
-            _KNOWN[who] = f"it fails among other robots ({error.problem})"
-            return _KNOWN[who]
-        # An engine may return anything.
-        if not getattr(one, "identical", lambda _: True)(other):
-            _KNOWN[who] = _VARIES
-        elif not _same_bits(one, among):
-            _KNOWN[who] = "commands depend on other robots of the batch"
-        else:
-            _KNOWN[who] = _CHANGES if _changed(trial) else ""
-    return _KNOWN[who]
+    if _is_own(trial) and who not in _KNOWN:
+        _KNOWN[who] = _found_doubts(trial)
+    return _KNOWN.get(who, "")
+
+
+def _found_doubts(trial: Trial) -> str:
+    """Reason from the first gait cycle, walked twice, once in each process, and among other robots."""
+    cycle = min(trial.robot.gait.period, trial.duration)
+    beside = replace(trial, seed=trial.seed + 1, joint_angles=() if any(trial.joint_angles) else (_OTHERWISE,))
+    if isinstance(trial.target, Target):
+        beside = replace(beside, target=Target(-0.5 * trial.target.bearing, trial.target.distance))
+    one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
+    try:
+        among = _steered([beside, trial, beside], cycle)[0].to_dataset()
+    except ChilopodError as error:  # of a controller for one robot alone
+        return f"it fails among other robots ({error.problem})"
+    # An engine may return anything.
+    if not getattr(one, "identical", lambda _: True)(other):
+        return _VARIES
+    if not _same_bits(one, among):
+        return "commands depend on other robots of the batch"
+    return _CHANGES if _changed(trial) else ""
 
 
 def _same_bits(alone: xr.Dataset, among: xr.Dataset) -> bool:
@@ -279,9 +279,8 @@ class Pace:
         done = 0
         while done < len(batch):
             first = batch[done]
-            speed = self._speeds.get(
-                first.engine, engine_named(first.engine).traits.robots_per_core * _USUAL / _SECONDS
-            )
+            usual = engine_named(first.engine).traits.robots_per_core * _USUAL / _SECONDS
+            speed = self._speeds.get(first.engine, usual)
             most = int(threads * speed * _SECONDS / first.duration)
             unit = threads * _LANES if most >= threads * _LANES else threads
             size = max(threads, most // unit * unit)

@@ -23,7 +23,7 @@ from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any, Self
 
 from chilopod.cores import cores
-from chilopod.errors import ClusterError, ParameterError, one_line
+from chilopod.errors import ClusterError, ParameterError, in_words
 from chilopod.extras import needs
 from chilopod.process import on_leave
 from chilopod.trials.batch import Pace
@@ -64,17 +64,10 @@ class Cluster:
     A killed worker is replaced, if it has a nanny, and its batch runs again; a batch that kills its worker repeatedly
     is an error after all others are done.
 
-    Parameters
-    ----------
-    where, threads
-        The address of a scheduler, such as ``tcp://10.0.0.1:8786``; or the number of worker processes to start on this
-        machine; and the threads of each, by default its share of the cores.
-
-    Raises
-    ------
-    ExtraError, ParameterError, ClusterError
-        If dask is not installed, the number of workers is out of range, or the cluster does not answer, has no workers,
-        or has another version of Python, chilopod, numpy or numba.
+    A cluster is the address of a scheduler, such as ``tcp://10.0.0.1:8786``; or the number of worker processes to start
+    on this machine, and the threads of each, by default its share of the cores. Raises ExtraError, ParameterError or
+    ClusterError if dask is not installed, the number of workers is out of range, or the cluster does not answer, has no
+    workers, or has another version of Python, chilopod, numpy or numba.
     """
 
     def __init__(self, where: str | int, threads: int | None = None) -> None:
@@ -210,7 +203,7 @@ class Cluster:
         gone = isinstance(error, (OSError, TimeoutError, asyncio.CancelledError)) or "Cancelled" in type(error).__name__
         if gone or self._client.status != "running":
             return self._error("the scheduler was lost; a kept study resumes from here")
-        return self._error(one_line(f"{type(error).__name__}: {error}"))
+        return self._error(in_words(error))
 
     def _error(self, problem: str) -> ClusterError:
         return ClusterError(problem, field="cluster", value=self._where)
@@ -262,13 +255,9 @@ def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
         with ThreadPoolExecutor(1) as knocking:
             knocking.submit(asyncio.run, asked()).result()
     except Exception as error:  # OSError, ValueError of an address, any error from bytes that are not dask's
-        reason = (
-            "does not answer"
-            if isinstance(error, OSError)
-            else f"must be a dask scheduler ({type(error).__name__}: {error})"
-        )
-        allowed = "the address of a dask scheduler"
-        raise ClusterError(one_line(reason), field="cluster", value=address, allowed=allowed) from None
+        other, allowed = f"must be a dask scheduler ({in_words(error)})", "the address of a dask scheduler"
+        reason = "does not answer" if isinstance(error, OSError) else other
+        raise ClusterError(reason, field="cluster", value=address, allowed=allowed) from None
     client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
     stack.callback(_closed, client)
     try:
@@ -279,8 +268,7 @@ def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
     except ClusterError:
         raise
     except Exception as error:  # the answer of something else, or a scheduler that is lost now
-        problem = f"cannot be used: {type(error).__name__}: {error}"
-        raise ClusterError(one_line(problem), field="cluster", value=address) from error
+        raise ClusterError(f"cannot be used: {in_words(error)}", field="cluster", value=address) from error
     return client
 
 

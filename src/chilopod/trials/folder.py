@@ -6,10 +6,9 @@ import json
 import os
 import re
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +17,7 @@ from chilopod.errors import OutputError, ParameterError
 from chilopod.netcdf import UnsoundError
 from chilopod.progress import Progress, silent
 from chilopod.trials.claims import nobody_in
-from chilopod.trials.store import Header, read_header
+from chilopod.trials.store import read_header
 from chilopod.trials.trial import digest_of, versions_of
 
 _TRIAL = re.compile(r".+-[0-9a-f]{20}\.nc")
@@ -53,7 +52,7 @@ class Kept(NamedTuple):
 
 def contents(folder: Path) -> Contents:
     """Return the names in a folder, in order. Raises ParameterError if the folder is missing or cannot be read."""
-    trials, aside, unfinished, foreign = list[Path](), list[Path](), list[Path](), list[Path]()
+    trials, aside, unfinished, foreign = found = [list[Path]() for _ in range(4)]
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
@@ -67,17 +66,17 @@ def contents(folder: Path) -> Contents:
                 paths.append(folder / entry.name)
     except OSError as error:
         raise ParameterError(f"must be a trial folder ({error.strerror})", field="folder", value=str(folder)) from None
-    return Contents(*(tuple(sorted(each)) for each in (trials, aside, unfinished, foreign)))
+    return Contents(*(tuple(sorted(each)) for each in found))
 
 
 def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
     """Return the headers of readable files, and the faults of the others."""
-    return _looked_at(paths, read_header, progress)
+    return _looked_at(paths, False, progress)
 
 
 def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
     """Return the same for files that are complete to the last byte and named after their trial."""
-    return _looked_at(paths, partial(read_header, whole=True), progress)
+    return _looked_at(paths, True, progress)
 
 
 def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], Wrong]:
@@ -145,9 +144,7 @@ def groups(trials: Sequence[Kept]) -> list[Group]:
     return sorted(found, key=lambda group: (group.robot, group.engine, repr(group)))
 
 
-def _looked_at(
-    paths: Sequence[Path], header_of: Callable[[Path], Header], progress: Progress
-) -> tuple[list[Kept], Wrong]:
+def _looked_at(paths: Sequence[Path], whole: bool, progress: Progress) -> tuple[list[Kept], Wrong]:
     found: list[Kept] = []
     wrong: Wrong = []
     for index, path in enumerate(paths):
@@ -155,7 +152,7 @@ def _looked_at(
             progress(index / len(paths), f"{index} of {len(paths)} trials")
         with suppress(FileNotFoundError):  # another process was faster
             try:
-                found.append(_kept(path, header_of(path)))
+                found.append(_kept(path, *read_header(path, whole=whole)))
             except UnsoundError as error:
                 wrong.append((path, str(error)))
     if paths:
@@ -163,20 +160,19 @@ def _looked_at(
     return found, wrong
 
 
-def _kept(path: Path, header: Header) -> Kept:
-    text = header.attributes.get("trial", "")
+def _kept(path: Path, attributes: dict[str, str], size: int) -> Kept:
+    text = attributes.get("trial", "")
     digest = digest_of(text)
     if not path.stem.endswith(f"-{digest}"):
-        raise UnsoundError(
-            f"holds another trial, whose name ends in {digest}.nc" if text else "is not the record of a trial"
-        )
+        other = f"holds another trial, whose name ends in {digest}.nc"
+        raise UnsoundError(other if text else "is not the record of a trial")
     try:
         settings = json.loads(text)
         # TOML begins with what stands in no section.
-        robot = tomllib.loads(header.attributes["robot"].partition("\n[")[0])["name"]
+        robot = tomllib.loads(attributes["robot"].partition("\n[")[0])["name"]
         ours = settings["engine"] in ENGINES
         here = versions_of(settings["engine"] if ours else ENGINES[0])
         current = all(settings.get(name) == here[name] for name in here if ours or name != "engine_version")
     except (LookupError, TypeError, ValueError, AttributeError):
         raise UnsoundError("is damaged or was edited") from None
-    return Kept(path, header.size, robot, settings, current)
+    return Kept(path, size, robot, settings, current)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from chilopod.cores import use_at_most
 from chilopod.engine.named import path_of
-from chilopod.errors import ClusterError, ParameterError, one_line
+from chilopod.errors import ClusterError, ParameterError, in_words
 from chilopod.sources import digest
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def walked_there(job: bytes, place: str) -> bytes:
             answer = pickle.dumps(error, pickle.HIGHEST_PROTOCOL)
             pickle.loads(answer)
         except Exception:  # a foreign exception that cannot be pickled
-            answer = pickle.dumps(ClusterError(one_line(f"{type(error).__name__}: {error}")))
+            answer = pickle.dumps(ClusterError(in_words(error)))
     return answer
 
 
@@ -136,7 +136,7 @@ def _walked(job: bytes, place: str) -> Any:
 
 
 def _not_importable(controller: object, error: Exception) -> ParameterError:
-    problem = f"cannot be imported on a worker ({one_line(f'{type(error).__name__}: {error}')})"
+    problem = f"cannot be imported on a worker ({in_words(error)})"
     value = None if controller is None else path_of(type(controller))
     allowed = "a class in a module that is on the path of the workers"
     return ParameterError(problem, field="controller", value=value, allowed=allowed)

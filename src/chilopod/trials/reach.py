@@ -46,13 +46,11 @@ Parts = Iterator[tuple[str, object]]
 _ATOMS = (type(None), bool, int, float, complex, str, bytes, bytearray, range, slice, type(...), type(NotImplemented))
 # The compiler may make one object or several with equal contents.
 _VALUES = (tuple, frozenset, CodeType)
-_GIVEN = frozenset(
-    f"__{name}__"
-    for name in (
-        *("dict", "weakref", "doc", "firstlineno", "static_attributes", "annotations", "annotations_cache"),
-        *("annotate_func", "slotnames", "dataclass_fields", "dataclass_params", "orig_bases", "parameters"),
-    )
-) | {"_abc_impl"}
+_GIVEN_NAMES = (
+    "dict weakref doc firstlineno static_attributes annotations annotations_cache annotate_func slotnames "
+    "dataclass_fields dataclass_params orig_bases parameters"
+)
+_GIVEN = {"_abc_impl", *(f"__{name}__" for name in _GIVEN_NAMES.split())}
 _MADE = frozenset(f"_{name}_" for name in ("member_names", "member_map", "value2member_map", "unhashable_values"))
 _WRITTEN = frozenset(
     f"__{name}__" for name in ("init", "repr", "eq", "hash", "setattr", "delattr", "replace", "lt", "le", "gt", "ge")

@@ -26,19 +26,16 @@ _MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing",
 def check_record(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
     """Return the record that an engine gave of a batch. Raises AnalysisError, which names the engine and the fault, if
     it does not fit these trials and their drawn disturbances."""
-    if not isinstance(data, xr.Dataset):
-        raise _refused("its record is no xarray.Dataset", trials[0].engine)
-    try:
-        wrong = _outline(data, walk, trials[0], len(trials)) or _content(data, walk, trials, drawn)
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        wrong = f"its record cannot be read ({in_words(error)})"
+    wrong = "its record is no xarray.Dataset"
+    if isinstance(data, xr.Dataset):
+        try:
+            wrong = _outline(data, walk, trials[0], len(trials)) or _content(data, walk, trials, drawn)
+        except (LookupError, TypeError, ValueError, AttributeError) as error:
+            wrong = f"its record cannot be read ({in_words(error)})"
     if wrong:
-        raise _refused(wrong, trials[0].engine)
+        problem = f"must return the records of the trials it received: {wrong}"
+        raise AnalysisError(problem, field=f"engine {trials[0].engine}")
     return data
-
-
-def _refused(wrong: str, engine: str) -> AnalysisError:
-    return AnalysisError(f"must return the records of the trials it received: {wrong}", field=f"engine {engine}")
 
 
 def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
@@ -65,11 +62,8 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     if found.shape != events.shape or not np.all(np.abs(found - events) <= _NEAR):
         return f"{found.size} commands instead of {events.size}, or at other times"
     sizes = {name: len(values) for name, values in coords.items()} | {"time": times.size, "event": events.size}
-    attributes = {
-        "engine": engine_named(first.engine).traits.name,
-        "robot": file_text(first.robot),
-        "duration": walk.time,
-    }
+    engine = engine_named(first.engine).traits.name
+    attributes = {"engine": engine, "robot": file_text(first.robot), "duration": walk.time}
     for name, value in attributes.items():
         if data.attrs.get(name) != value:
             return f"its attribute {name} is {str(data.attrs.get(name))[:40]!r}, not {str(value)[:40]!r}"

@@ -18,6 +18,7 @@ from chilopod.trials.description import meanwhile_unchanged
 from chilopod.trials.store import Store
 from chilopod.trials.trial import Trial
 
+Folder = str | Path | None
 _Walked = list[tuple[Trial, xr.Dataset]]
 
 _COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
@@ -26,12 +27,11 @@ _PATIENCE = 120.0  # s in which another process must finish a trial; a stopped p
 
 
 def run(
-    trials: Sequence[Trial],
-    folder: str | Path | None = None,
-    progress: Progress = silent,
-    executor: Executor | None = None,
+    trials: Sequence[Trial], folder: Folder = None, progress: Progress = silent, executor: Executor | None = None
 ) -> list[xr.Dataset]:
-    """Run trials, or read the records of previous runs.
+    """Run trials, or read the records of previous runs; return the record of every trial, with one ``robot`` and the
+    trial in the attributes. Raises ParameterError or OutputError if memory cannot hold the records, or the folder has
+    no room for them.
 
     Parameters
     ----------
@@ -44,15 +44,6 @@ def run(
         Function of the fraction done (0 to 1) and a few words.
     executor
         Executor that walks the batches; by default that of :func:`using`, else all cores of this machine.
-
-    Returns
-    -------
-    The record of every trial, with one ``robot`` and the trial in the attributes.
-
-    Raises
-    ------
-    ParameterError, OutputError
-        If memory cannot hold the records, or the folder has no room for them.
     """
     trials = as_now(trials)
     check_fits(trials)
@@ -66,10 +57,7 @@ def check_fits(trials: Sequence[Trial]) -> None:
 
 
 def run_each(
-    trials: Sequence[Trial],
-    folder: str | Path | None = None,
-    progress: Progress = silent,
-    executor: Executor | None = None,
+    trials: Sequence[Trial], folder: Folder = None, progress: Progress = silent, executor: Executor | None = None
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
     """Run or read trials as :func:`run` does, and yield each distinct trial and its record as soon as it is ready, in
     any order. Memory holds one batch at a time."""
@@ -77,7 +65,7 @@ def run_each(
 
 
 def _each(
-    trials: Sequence[Trial], folder: str | Path | None, progress: Progress, executor: Executor | None
+    trials: Sequence[Trial], folder: Folder, progress: Progress, executor: Executor | None
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
     distinct = {trial.file_name: trial for trial in trials}
     store = None if folder is None else Store(folder)

@@ -7,7 +7,7 @@ import logging
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -103,10 +103,8 @@ class Store:
         self._said.add(words)
 
     def _move_aside(self, path: Path, why: str) -> None:
-        aside, count = path.with_name(f"{path.name}.aside"), 1
-        while os.path.lexists(aside):
-            count += 1
-            aside = path.with_name(f"{path.name}.aside{count}")
+        names = (path.with_name(f"{path.name}.aside{number}") for number in chain([""], count(2)))
+        aside = next(each for each in names if not os.path.lexists(each))
         try:
             path.rename(aside)
         except FileNotFoundError:
@@ -119,14 +117,6 @@ class Store:
         """Remove unfinished files of killed processes."""
         for path in self.folder.glob(f"{_UNFINISHED}*"):
             path.unlink()
-
-
-@dataclass(frozen=True)
-class Header:
-    """Attributes of a record as text, and size of its file, bytes."""
-
-    attributes: Mapping[str, str]
-    size: int
 
 
 def content_of(record: xr.Dataset) -> bytes:
@@ -194,15 +184,15 @@ def read_record(path: Path) -> xr.Dataset:
     return record.assign(whole).assign_coords(wider)
 
 
-def read_header(path: Path, *, whole: bool = False) -> Header:
-    """Read the header of a record's file and check the whole file against its seal if ``whole``, otherwise only its
-    length. Raises the errors of :func:`chilopod.netcdf.unsealed`."""
+def read_header(path: Path, *, whole: bool = False) -> tuple[dict[str, str], int]:
+    """Attributes of a record as text, and size of its file, bytes, which is checked against its seal if ``whole``,
+    otherwise only its length. Raises the errors of :func:`chilopod.netcdf.unsealed`."""
     if whole:
         unsealed(path)
     with sealed_file(path) as file:
         try:
             with netcdf_file(file, mmap=True) as front:
                 attributes = {name: value for name, value in vars(front).items() if isinstance(value, bytes)}
-                return Header({name: value.decode() for name, value in attributes.items()}, file.seek(0, io.SEEK_END))
+                return {name: value.decode() for name, value in attributes.items()}, file.seek(0, io.SEEK_END)
         except _DAMAGES:
             raise UnsoundError("is damaged or was edited") from None

@@ -22,16 +22,11 @@ AVERAGED = 5.0
 class WalkSummary:
     """Summary of the end of one walk.
 
-    Attributes
-    ----------
-    status
-        Label of :class:`chilopod.engine.Status`.
-    joint_angles, axis_radius
-        Means over the last :data:`AVERAGED` s, a longer gait cycle, or a shorter walk, rad, shape (N-1,), NaN if the
-        walk failed, or if its samples there leave more than half of the cycle out; and radius from these angles, see
-        :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
-    x, y
-        Position of the centre of module 1 at the end, m.
+    ``status`` is a label of :class:`chilopod.engine.Status`. ``joint_angles`` are means over the last :data:`AVERAGED`
+    s, a longer gait cycle, or a shorter walk, rad, shape (N-1,), NaN if the walk failed, or if its samples there leave
+    more than half of the cycle out; ``axis_radius`` is that of these angles, see
+    :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight. ``x`` and ``y`` are the position of
+    the centre of module 1 at the end, m.
     """
 
     status: str

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 import chilopod
 from chilopod.engine import Controller, Engine, engine_named
-from chilopod.engine.arguments import as_array, as_number, as_seeds
+from chilopod.engine.arguments import as_array, as_number, as_seeds, require
 from chilopod.engine.named import check_controller, path_of
-from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
@@ -71,23 +70,19 @@ class Disturbance:
         return replace(self, **{name: factor * getattr(self, name) for name in _DEVIATIONS})
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.missed <= 1.0:
-            raise ParameterError("must be a fraction", field="missed", value=self.missed, allowed="0 to 1")
+        require(0.0 <= self.missed <= 1.0, "must be a fraction", "missed", self.missed, "0 to 1")
         for name in _DEVIATIONS:
             value = getattr(self, name)
-            if not 0.0 <= value < 10.0:
-                raise ParameterError("is out of range", field=name, value=value, allowed="0 or more, less than 10")
+            require(0.0 <= value < 10.0, "is out of range", name, value, "0 or more, less than 10")
         foot: Any = self.slick
         known = foot is None or (isinstance(foot, tuple) and [type(each) for each in foot] == [int, int])
-        if not known or (foot and not (foot[0] >= 0 <= foot[1] <= 1)):
-            allowed = "(module, side), module from 0, side 0 or 1; or None"
-            raise ParameterError("must be a foot", field="slick", value=foot, allowed=allowed)
+        fits = known and not (foot and not (foot[0] >= 0 <= foot[1] <= 1))
+        require(fits, "must be a foot", "slick", foot, "(module, side), module from 0, side 0 or 1; or None")
 
     def check_foot(self, modules: int) -> None:
         """Refuse a foot without grip that a robot of this many modules does not have."""
-        if self.slick is not None and self.slick[0] >= modules:
-            allowed = f"module 0 to {modules - 1}"
-            raise ParameterError("must be a foot of the robot", field="slick", value=self.slick, allowed=allowed)
+        there = self.slick is None or self.slick[0] < modules
+        require(there, "must be a foot of the robot", "slick", self.slick, f"module 0 to {modules - 1}")
 
 
 NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
@@ -105,7 +100,8 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Trial:
-    """Description of a walk: everything that defines it.
+    """Everything that defines a walk. Raises ParameterError if a value is out of range, the engine is unknown or cannot
+    walk the robot, or the controller cannot be identified by its code and fields.
 
     Attributes
     ----------
@@ -127,12 +123,6 @@ class Trial:
         Name of an engine, one of :data:`chilopod.engine.ENGINES` or ``package.module:object``.
     brief
         True to keep only the outcomes of a course's targets, not its motion over time.
-
-    Raises
-    ------
-    ParameterError
-        If a value is out of range, the engine is unknown or cannot walk the robot, or the controller cannot be
-        identified by its code and fields.
     """
 
     robot: Robot
@@ -150,30 +140,28 @@ class Trial:
 
     def __post_init__(self) -> None:
         for name, (kind, allowed) in _KINDS.items():
-            if not isinstance(getattr(self, name), kind):
-                raise ParameterError("has the wrong type", field=name, value=getattr(self, name), allowed=allowed)
-        seeds = as_seeds([self.seed], "seed")
+            value = getattr(self, name)
+            require(isinstance(value, kind), "has the wrong type", name, value, allowed)
+        (seed,) = as_seeds([self.seed], "seed") or []
         # Equal trials have one text, whatever kinds of numbers they were given.
         plain_values = {
-            "duration": as_number("duration", self.duration),
-            "seed": seeds[0] if seeds else 0,
-            "joint_angles": self._every_joint_angle(),
-            "rate": as_number("rate", self.rate),
+            **{name: as_number(name, getattr(self, name)) for name in ("duration", "rate")},
             **{name: bool(getattr(self, name)) for name in ("forces", "poses", "brief")},
+            "seed": seed,
+            "joint_angles": self._every_joint_angle(),
         }
         for name, value in plain_values.items():
             object.__setattr__(self, name, value)
         in_range("duration", self.duration, LONGEST, "s")
         course, engine = self.course, engine_named(self.engine)
-        if self.brief and course is None:
-            raise ParameterError("must be False: only courses have brief records", field="brief", value=True)
-        if course is not None and self.duration != course.duration:
-            allowed = f"{course.duration:g} s"
-            raise ParameterError("must be that of the course", field="duration", value=self.duration, allowed=allowed)
+        require(course or not self.brief, "must be False: only courses have brief records", "brief", True)
+        if course:
+            fits, allowed = self.duration == course.duration, f"{course.duration:g} s"
+            require(fits, "must be that of the course", "duration", self.duration, allowed)
         engine.common(self.robot)
         self.disturbance.check_foot(self.robot.body.modules)
-        if self.recording.poses and not engine.traits.poses:
-            raise ParameterError("must be False: this engine has no poses in space", field="poses", value=True)
+        has_poses = not self.recording.poses or engine.traits.poses
+        require(has_poses, "must be False: this engine has no poses in space", "poses", True)
         if self.controller is not None:
             check_controller(self.controller)
             self.steering  # noqa: B018  (as it is now; the content of a frozen dataclass may still change)
@@ -181,13 +169,10 @@ class Trial:
     def _every_joint_angle(self) -> tuple[float, ...]:
         """Joint angles at the start, one for each joint, or none."""
         angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
-        problem, allowed = "", ""
-        if angles.shape not in ((0,), (1,), (joints,)):
-            problem, allowed = f"must be one angle for each joint, not {angles.size}", f"{joints}, or one for all"
-        elif not (np.abs(angles) <= _MOST_BENT).all():
-            problem, allowed = "must be smaller", f"-{_MOST_BENT} to {_MOST_BENT} rad (85 deg)"
-        if problem:
-            raise ParameterError(problem, field="joint_angles", value=self.joint_angles, allowed=allowed)
+        fits, problem = angles.shape in ((0,), (1,), (joints,)), f"must be one angle for each joint, not {angles.size}"
+        require(fits, problem, "joint_angles", self.joint_angles, f"{joints}, or one for all")
+        inside, allowed = np.abs(angles) <= _MOST_BENT, f"-{_MOST_BENT} to {_MOST_BENT} rad (85 deg)"
+        require(inside.all(), "must be smaller", "joint_angles", self.joint_angles, allowed)
         return tuple(np.broadcast_to(angles, joints if angles.size else 0).tolist())
 
     def __getstate__(self) -> dict[str, Any]:
@@ -231,10 +216,9 @@ class Trial:
     def repeated(self, seed: int | None = None, repeats: int = 1) -> tuple[Trial, ...]:
         """Repeat the trial with consecutive seeds, or once without disturbance if the seed is None. Raises
         ParameterError for no walks, or several identical ones."""
-        if repeats < 1:
-            raise ParameterError("must be positive", field="repeats", value=repeats)
-        if repeats > 1 and seed is None:
-            raise ParameterError("must be 1 without a seed: trials would be equal", field="repeats", value=repeats)
+        require(repeats >= 1, "must be positive", "repeats", repeats)
+        several = seed is not None or repeats == 1
+        require(several, "must be 1 without a seed: trials would be equal", "repeats", repeats)
         spread = NONE if seed is None else self.disturbance
         return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 
@@ -294,17 +278,9 @@ def digest_of(text: str) -> str:
 
 @dataclass(frozen=True)
 class Drawn:
-    """Disturbance of one robot, drawn from a seed.
-
-    Attributes
-    ----------
-    joint_angles, heading, friction
-        Joint angles, shape (N-1,), and heading at the start, rad; factors on the friction coefficients of feet, shape
-        (N, 2).
-    bearing, missed, scan_seed
-        Errors of the measured bearings, rad, and whether the scanner misses the target, shape (looks,); seed of the
-        noise of a scanner that has its own.
-    """
+    """Disturbance of one robot, drawn from a seed: joint angles, shape (N-1,), and heading at the start, rad; factors
+    on the friction coefficients of feet, shape (N, 2); errors of the measured bearings, rad, and whether the scanner
+    misses the target, shape (looks,); seed of the noise of a scanner that has its own."""
 
     joint_angles: Array
     heading: float
@@ -325,9 +301,8 @@ def draw(
     if disturbance.slick is not None:
         feet[disturbance.slick] *= _SLICK
     missed = np.random.default_rng(streams[5])
-    nominal = np.array(joint_angles) if joint_angles else np.zeros(modules - 1)
     return Drawn(
-        nominal + disturbance.joint_angle * joints.standard_normal(modules - 1),
+        np.array(joint_angles or 0.0) + disturbance.joint_angle * joints.standard_normal(modules - 1),
         float(disturbance.heading * heading.standard_normal()),
         feet,
         disturbance.bearing * bearing.standard_normal(looks),
@@ -339,8 +314,6 @@ def draw(
 def conditions(engine: Engine, robot: Robot, drawn: Sequence[Drawn], noisy: bool) -> dict[str, Any]:
     """Arguments of an engine's ``start`` for drawn walks; a ``noisy`` engine also gets seeds of its sensor noise."""
     angles, headings = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
-    return {
-        "initial": engine.initial_states(robot, angles, headings),
-        "friction": np.stack([each.friction for each in drawn]),
-        "seeds": [each.scan_seed for each in drawn] if noisy and engine.traits.noisy else None,
-    }
+    seeds = [each.scan_seed for each in drawn] if noisy and engine.traits.noisy else None
+    friction = np.stack([each.friction for each in drawn])
+    return {"initial": engine.initial_states(robot, angles, headings), "friction": friction, "seeds": seeds}

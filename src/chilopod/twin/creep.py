@@ -26,13 +26,8 @@ _SUNK = 0.5  # of its height: a robot that is lower does not stand on its feet
 
 @dataclass(frozen=True)
 class Creep:
-    """Reaction of standing feet to a push.
-
-    Attributes
-    ----------
-    along, across
-        Viscous coefficient of one foot, push ahead and to the side, N*s/m; NaN if the robot cannot stand.
-    """
+    """Reaction of standing feet to a push: viscous coefficient of one foot, ``along`` for a push ahead and ``across``
+    for one to the side, N*s/m; NaN if the robot cannot stand."""
 
     along: float
     across: float
@@ -51,14 +46,11 @@ def foot_creep(robot: Robot) -> Creep:
 def _coefficient(robot: Robot, axis: int) -> float:
     plan = compiled(robot)
     model, data = plan.model, mujoco.MjData(plan.model)
-    data.qpos[:] = plan.initial_positions()
-    stance = joint_angles(plan.twin, 0.0, plan.twin.hip_height)
-    data.qpos[plan.leg_positions] = stance
-    data.ctrl[plan.leg_controls] = stance
+    start, stance = plan.initial_positions(), joint_angles(plan.twin, 0.0, plan.twin.hip_height)
+    start[plan.leg_positions] = stance
     modules = [model.body(f"module{i}").id for i in range(1, robot.body.modules + 1)]
+    push, speeds = _PUSH * robot.module_mass * GRAVITY, []
     # Pushes in both directions cancel a drift.
-    start, speeds = data.qpos.copy(), []
-    push = _PUSH * robot.module_mass * GRAVITY
     for sign in (1.0, -1.0):
         mujoco.mj_resetData(model, data)
         data.qpos[:] = start

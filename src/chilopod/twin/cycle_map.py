@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from chilopod.cores import cores
-from chilopod.engine.arguments import as_array
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.engine.arguments import as_array, require
+from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
 from chilopod.robot import Robot
 from chilopod.twin.legs import servo_targets, twin_of
@@ -40,42 +40,35 @@ class CycleMap:
     so the map is a function of the state. ``names`` and ``units`` are those of the coordinates, ``period`` is a
     cycle in s, and ``control`` are the controls before every step, which are exact for a robot's :func:`walk_cycle`.
 
-    Parameters
-    ----------
-    model
-        Model, which is copied. Joints are hinges and slides, beside one free joint in front; gravity is vertical, and
-        actuators and sensors have no states and no delays. Others are refused by a ParameterError.
-    control
-        Controls before every step of a cycle, shape (steps, nu).
-    travel
-        Names of joints along which the world looks the same, such as the slide ahead of a planar walker. It must also
-        look the same from wherever a free body stands; :meth:`depends_on_place` tells.
+    The model is copied. Its joints are hinges and slides, beside one free joint in front; gravity is vertical, and
+    actuators and sensors have no states and no delays. Others are refused by a ParameterError. Controls before every
+    step of a cycle have the shape (steps, nu). ``travel`` names joints along which the world looks the same, such as
+    the slide ahead of a planar walker. It must also look the same from wherever a free body stands;
+    :meth:`depends_on_place` tells.
     """
 
     def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: tuple[str, ...] = ()) -> None:
-        if not isinstance(model, mujoco.MjModel):
-            raise ParameterError("must be a mujoco.MjModel", field="model", value=type(model).__name__)
+        require(isinstance(model, mujoco.MjModel), "must be a mujoco.MjModel", "model", type(model).__name__)
         self.model, self.control = copy.copy(model), np.array(as_array("control", control))
         kinds = self.model.jnt_type.tolist()
         self._free = free = kinds[:1] == [_FREE]
         flags, states = self.model.opt.enableflags, (self.model.na, self.model.nhistory, self.model.npluginstate)
         asleep = flags & int(mujoco.mjtEnableBit.mjENBL_SLEEP)
         plain = kinds and set(kinds[free:]) <= set(_PLAIN) and not self.model.opt.gravity[:2].any()
-        if not plain or any(states) or asleep:
-            allowed = "hinges and slides behind at most one free joint, actuators and sensors without states or "
-            allowed += "delays, bodies that do not sleep, vertical gravity"
-            raise ParameterError("must have a state that can be put back", field="model", allowed=allowed)
-        if self.control.ndim != 2 or self.control.shape[1] != self.model.nu or not len(self.control):
-            allowed = f"a row for each step, {self.model.nu} columns"
-            raise ParameterError("must be a table", field="control", value=self.control.shape, allowed=allowed)
-        if not np.isfinite(self.control).all():
-            wrong = float(self.control[~np.isfinite(self.control)][0])
-            raise ParameterError("must be finite", field="control", value=wrong)
+        allowed = "hinges and slides behind at most one free joint, actuators and sensors without states or delays, "
+        allowed += "bodies that do not sleep, vertical gravity"
+        fits = plain and not any(states) and not asleep
+        require(fits, "must have a state that can be put back", "model", allowed=allowed)
+        fits = self.control.ndim == 2 and self.control.shape[1] == self.model.nu and len(self.control)
+        allowed = f"a row for each step, {self.model.nu} columns"
+        require(fits, "must be a table", "control", self.control.shape, allowed)
+        finite = np.isfinite(self.control)
+        require(finite.all(), "must be finite", "control", next(iter(self.control[~finite].tolist()), None))
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.model.opt.tolerance, self.period = _TOLERANCE, len(self.control) * float(self.model.opt.timestep)
         self._joints = joints = [self.model.joint(i).name or f"joint {i}" for i in range(free, len(kinds))]
-        if type(travel) not in (tuple, list) or len(set(joints).intersection(travel)) != len(travel):
-            raise ParameterError("must name joints", field="travel", value=travel, allowed=", ".join(joints))
+        named = type(travel) in (tuple, list) and len(set(joints).intersection(travel)) == len(travel)
+        require(named, "must name joints", "travel", travel, ", ".join(joints))
         self._kept = np.array([i for i, name in enumerate(joints) if name not in travel], dtype=np.intp)
         measures = ["m" if kind == _PLAIN[1] else "rad" for kind in kinds[free:]]
         rates = [f"rate of {name}" for name in (*_SPEEDS[: 6 * free], *joints)]
@@ -96,8 +89,8 @@ class CycleMap:
     def full(self, x: ArrayLike) -> tuple[Array, Array]:
         """``qpos`` (..., nq) and ``qvel`` (..., nv) at the origin along x, from coordinates (runs, n) or (n,)."""
         x = as_array("x", x)
-        if not x.size or x.shape[-1:] != (len(self.names),) or x.ndim > 2:
-            raise ParameterError("must be coordinates", field="x", value=x.shape, allowed=f"(runs, {len(self.names)})")
+        fits = x.size and x.shape[-1:] == (len(self.names),) and x.ndim <= 2
+        require(fits, "must be coordinates", "x", x.shape, f"(runs, {len(self.names)})")
         positions = np.zeros((*x.shape[:-1], self.model.nq))
         angles, rates = np.split(x, [len(self.names) - self.model.nv], axis=-1)
         positions[..., 7 * self._free + self._kept] = angles[..., 3 * self._free :]
@@ -170,11 +163,8 @@ class CycleMap:
         found, timestep = [], float(self.model.opt.timestep)
         for geom in sorted(np.flatnonzero(differs.any(axis=0)), key=lambda geom: -differs[:, geom].sum()):
             first, last = np.flatnonzero(differs[:, geom])[[0, -1]] * timestep
-            name = (
-                self.model.geom(geom).name or geom
-                if geom < geoms
-                else f"limit of {self._joints[geom - geoms - self._free]}"
-            )
+            joint = geom - geoms
+            name = self.model.geom(geom).name or geom if joint < 0 else f"limit of {self._joints[joint - self._free]}"
             found.append(f"{name} at {first:.3f} to {last + timestep:.3f} s")
         return tuple(found)
 
@@ -185,14 +175,12 @@ def walk_cycle(robot: Robot, edit: Edit | None = None) -> tuple[CycleMap, Array]
     whole number of control intervals, or steps are too coarse for the servos."""
     twin = twin_of(robot)
     count = robot.gait.period / twin.control_interval
-    if abs(count - round(count)) > _WHOLE * count:
-        said, value = "must repeat with the gait", f"{twin.control_interval:g} s"
-        allowed = "a whole part of a gait cycle"
-        raise ParameterError(said, field="twin.control_interval", value=value, allowed=allowed)
+    whole, interval = abs(count - round(count)) <= _WHOLE * count, f"{twin.control_interval:g} s"
+    allowed = "a whole part of a gait cycle"
+    require(whole, "must repeat with the gait", "twin.control_interval", interval, allowed)
     coarse = 2.0 * twin.joint_inertia / max(twin.servo_damping, 1e-300)
-    if twin.timestep > coarse:
-        said, value = "must be shorter for the damping of the servos", f"{1e3 * twin.timestep:g} ms"
-        raise ParameterError(said, field="twin.timestep", value=value, allowed=f"at most {1e3 * coarse:.3g} ms")
+    said, allowed = "must be shorter for the damping of the servos", f"at most {1e3 * coarse:.3g} ms"
+    require(twin.timestep <= coarse, said, "twin.timestep", f"{1e3 * twin.timestep:g} ms", allowed)
     plan = compiled(robot, edit=edit)
     control = np.zeros((round(count), plan.model.nu))
     targets = servo_targets(robot, np.arange(len(control)) * twin.control_interval)

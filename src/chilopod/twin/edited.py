@@ -29,14 +29,9 @@ class Edited:
 
         give = Edited("give", rolls)  # in module my_robot: chilopod walk --engine my_robot:give
 
-    Parameters
-    ----------
-    name
-        Name of the engine in records.
-    edit
-        A function, called with the description (``mujoco.MjSpec``, names as in :class:`TwinModel`) and the robot,
-        before the corrections for the step (:mod:`chilopod.twin.step`). Everything that its code can reach is part of
-        a trial, as for a controller.
+    It has a name, for records, and a function ``edit``, which is called with the description (``mujoco.MjSpec``, names
+    as in :class:`TwinModel`) and the robot, before the corrections for the step (:mod:`chilopod.twin.step`). Everything
+    that its code can reach is part of a trial, as for a controller.
     """
 
     def __init__(self, name: str, edit: Edit) -> None:

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chilopod.errors import ParameterError
+from chilopod.engine.arguments import require
 from chilopod.robot import Robot
 from chilopod.twin.legs import servo_targets, twin_of
 from chilopod.twin.model import SIDES, TwinModel, build
@@ -93,8 +93,7 @@ def urdf(robot: Robot) -> str:
         _add_link(root, model, name, [back, 0.0, 0.0])
         if i:
             ahead = -0.5 * length if i == 1 else -length
-            joint = _add_joint(root, f"yaw{i}", f"module{i}", name, [ahead, 0.0, 0.0], model)
-            _limit(joint, 0.5 * math.pi, effort=0.0)
+            _add_joint(root, model, f"yaw{i}", f"module{i}", name, [ahead, 0.0, 0.0])
         for side in SIDES:
             _add_leg(root, model, f"leg{i + 1}_{side}", name, back, steered=i == 0)
     ET.indent(root)
@@ -107,9 +106,8 @@ FORMATS: dict[str, tuple[str, Callable[[Robot], str]]] = {".xml": ("MJCF", mjcf)
 
 def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:
     """Return the format of a suffix, such as ``.urdf``; ParameterError for another suffix."""
-    if suffix.lower() not in FORMATS:
-        allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
-        raise ParameterError(f"must end with {allowed}", field="out", value=suffix)
+    allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
+    require(suffix.lower() in FORMATS, f"must end with {allowed}", "out", suffix)
     return FORMATS[suffix.lower()]
 
 
@@ -145,8 +143,8 @@ def _write_all_digits(root: ET.Element, model: mujoco.MjModel) -> None:
     """Replace the numbers that MuJoCo rounded to six digits by those of the compiled model."""
     option = root.find("option")
     assert option is not None
-    option.set("timestep", repr(float(model.opt.timestep)))
-    option.set("impratio", repr(float(model.opt.impratio)))
+    for each in ("timestep", "impratio"):
+        option.set(each, repr(float(getattr(model.opt, each))))
     for parent in root.iter():
         for element in parent:
             attributes = _NUMBERS.get(element.tag)
@@ -169,12 +167,12 @@ def _add_leg(root: ET.Element, model: mujoco.MjModel, leg: str, module: str, bac
         parent, rest = f"{leg}_carrier", 1.0 - _CARRIER
         link = ET.SubElement(root, "link", name=parent)
         _inertial(link, [0.0] * 3, _CARRIER * model.body(upper).mass[0], _CARRIER * model.body(upper).inertia)
-        _servo_limit(_add_joint(root, f"{leg}_yaw", module, parent, place, model), model)
+        _add_joint(root, model, f"{leg}_yaw", module, parent, place)
         place = np.zeros(3)
     _add_link(root, model, upper, [0.0] * 3, rest)
-    _servo_limit(_add_joint(root, f"{leg}_hip", parent, upper, place, model), model)
+    _add_joint(root, model, f"{leg}_hip", parent, upper, place)
     _add_link(root, model, lower, [0.0] * 3)
-    _servo_limit(_add_joint(root, f"{leg}_knee", upper, lower, model.body(lower).pos, model), model)
+    _add_joint(root, model, f"{leg}_knee", upper, lower, model.body(lower).pos)
 
 
 def _add_link(root: ET.Element, model: mujoco.MjModel, name: str, shift: Sequence[float], part: float = 1.0) -> None:
@@ -211,28 +209,20 @@ def _inertial(link: ET.Element, place: ArrayLike, mass: float, inertia: ArrayLik
     ET.SubElement(element, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
 
 
-def _add_joint(
-    root: ET.Element, name: str, parent: str, child: str, place: ArrayLike, model: mujoco.MjModel
-) -> ET.Element:
-    joint = ET.SubElement(root, "joint", name=name, type="revolute")
+def _add_joint(root: ET.Element, model: mujoco.MjModel, name: str, parent: str, child: str, place: ArrayLike) -> None:
+    """Add a yaw joint between modules, which bends to a right angle, or one with a servo: it turns all the way round,
+    with the torque at an error of half a turn."""
+    joint, compiled = ET.SubElement(root, "joint", name=name, type="revolute"), model.joint(name)
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
     ET.SubElement(joint, "origin", xyz=_numbers(place), rpy="0 0 0")
-    compiled = model.joint(name)
     ET.SubElement(joint, "axis", xyz=_numbers(compiled.axis))
     damping, friction = _numbers(compiled.damping), _numbers(compiled.frictionloss)
     ET.SubElement(joint, "dynamics", damping=damping, friction=friction)
-    return joint
-
-
-def _servo_limit(joint: ET.Element, model: mujoco.MjModel) -> None:
-    """Limits of a servo: a whole turn, and the torque at an error of half a turn."""
-    _limit(joint, math.pi, effort=math.pi * float(model.actuator(joint.get("name")).gainprm[0]))
-
-
-def _limit(joint: ET.Element, most: float, effort: float) -> None:
+    free = child.startswith("module")
+    most, effort = (0.5 * math.pi, 0.0) if free else (math.pi, math.pi * float(model.actuator(name).gainprm[0]))
     limits = {"lower": -most, "upper": most, "effort": effort, "velocity": _FASTEST}
-    ET.SubElement(joint, "limit", {name: repr(value) for name, value in limits.items()})
+    ET.SubElement(joint, "limit", {key: repr(value) for key, value in limits.items()})
 
 
 def _numbers(values: ArrayLike) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.engine import Status
+from chilopod.engine.contract import Marks
 from chilopod.frozen import Array
 
 _FASTEST = 100.0  # m/s and rad/s: a robot that moves faster than that has blown up
@@ -17,11 +18,7 @@ _MOST_BENT = 0.5 * np.pi  # rad, of a yaw joint
 
 
 def failures(
-    positions: Array,
-    rates: Array,
-    before: tuple[Array, Array],
-    yaw_positions: NDArray[np.intp],
-    warned: NDArray[np.bool_],
+    positions: Array, rates: Array, before: tuple[Array, Array], yaw_positions: NDArray[np.intp], warned: Marks
 ) -> dict[int, tuple[int, Status]]:
     """Failures of the robots of a batch in some steps: for each robot the first step after its walk, and its status.
 
@@ -40,8 +37,8 @@ def failures(
         quiet = (np.abs(rates).max(2) < _FASTEST) & (np.abs(positions).max(2) < _FARTHEST)
         straight, standing = np.abs(bends).max(2) <= _MOST_BENT, upright > _UPRIGHT
     found = {}
+    signs = ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (standing, Status.FALLEN))
     for row in range(len(positions)):
-        signs = ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (standing, Status.FALLEN))
         bad = [(int(np.argmin(good[row])), status) for good, status in signs if not good[row].all()]
         if bad:
             found[row] = min(bad, key=itemgetter(0))
@@ -52,6 +49,6 @@ def failures(
 
 def _stopped(positions: Array, rates: Array, before: tuple[Array, Array]) -> int:
     """First step from which on the state only repeats, up to the end."""
-    places, speeds = np.vstack([before[0], positions]), np.vstack([before[1], rates])
-    moved = (np.diff(places, axis=0) != 0.0).any(axis=1) | (np.diff(speeds, axis=0) != 0.0).any(axis=1)
+    states = np.vstack([np.hstack(before), np.hstack([positions, rates])])
+    moved = (np.diff(states, axis=0) != 0.0).any(axis=1)
     return int(np.flatnonzero(moved)[-1]) + 1 if moved.any() else 0

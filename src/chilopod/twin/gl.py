@@ -64,23 +64,25 @@ def find() -> Found:
     The answer holds for the life of the process; the first call takes about a second.
     """
     wish = os.environ.get("MUJOCO_GL", "").lower().strip()
-    known = _OWN.get(sys.platform, _OWN["linux"])
+    known, wanted = _OWN.get(sys.platform, _OWN["linux"]), _ALIAS.get(wish, wish)
     if wish in _OFF:
         return Found(None, missing=f"drawing is switched off by MUJOCO_GL={wish}", mend="unset MUJOCO_GL")
-    if wish not in _ANY and _ALIAS.get(wish, wish) not in known:
+    if wish not in _ANY and wanted not in known:
         return Found(None, missing=f"MUJOCO_GL={one_line(wish)} is no backend here", mend="unset MUJOCO_GL")
-    faults = {}
-    for name in _candidates(known) if wish in _ANY else (_ALIAS.get(wish, wish),):
+    windows = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or "egl" not in known
+    faults, candidates = {}, (name for name in known if windows or name != "glfw")
+    for name in candidates if wish in _ANY else (wanted,):
         renderer, fault = _tried(name)
         if not fault:
             return Found(name, renderer)
         faults[name] = fault
-    missing = "no OpenGL works: " + "; ".join(f"{name}: {fault}" for name, fault in faults.items())
+    mend = _MESA if "egl" in known else "install a driver for the graphics card"
     if any("No module named" in fault for fault in faults.values()):
-        return Found(None, missing=missing, mend=_PYTHON)
-    if wish not in _ANY:
-        return Found(None, missing=missing, mend="unset MUJOCO_GL")
-    return Found(None, missing=missing, mend=_MESA if "egl" in known else "install a driver for the graphics card")
+        mend = _PYTHON
+    elif wish not in _ANY:
+        mend = "unset MUJOCO_GL"
+    missing = "no OpenGL works: " + "; ".join(f"{name}: {fault}" for name, fault in faults.items())
+    return Found(None, missing=missing, mend=mend)
 
 
 def import_mujoco() -> None:
@@ -115,20 +117,12 @@ def context(width: int, height: int) -> Iterator[None]:
         made.free()
 
 
-def _candidates(known: tuple[str, ...]) -> tuple[str, ...]:
-    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    return known if display or "egl" not in known else tuple(name for name in known if name != "glfw")
-
-
 def _tried(name: str) -> tuple[str, str]:
     """Name of the driver of a backend, and its fault, if any."""
     # Without the folder that Python was started in, where a file could be called as a module is.
-    command = [sys.executable, "-P", "-c", _TRIAL, name]
-    environment = {**os.environ, "MUJOCO_GL": name}
+    command, backend = [sys.executable, "-P", "-c", _TRIAL, name], {**os.environ, "MUJOCO_GL": name}
     try:
-        done = subprocess.run(
-            command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=_PATIENCE, check=False
-        )
+        done = subprocess.run(command, env=backend, stdin=subprocess.DEVNULL, capture_output=True, timeout=_PATIENCE)
     except subprocess.TimeoutExpired:
         return "", f"gave no answer in {_PATIENCE:g} s"
     except OSError as error:

@@ -54,12 +54,9 @@ def check_reach(robot: Robot) -> None:
     least, most = np.ceil(1e5 * low.max()) / 100.0, np.floor(1e5 * high.min()) / 100.0
     fits = least <= most and np.abs(ahead).max() <= stretched
     heights = f"{least:g} to {most:g} mm with these links" if fits else "other links"
-    raise ParameterError(
-        f"must fit gait.stride = {1e3 * robot.gait.stride:.4g} mm: the leg cannot reach its path",
-        field="twin.hip_height",
-        value=f"{1e3 * twin.hip_height:.4g} mm",
-        allowed=f"{heights}, or a shorter gait.stride",
-    )
+    problem = f"must fit gait.stride = {1e3 * robot.gait.stride:.4g} mm: the leg cannot reach its path"
+    given, allowed = f"{1e3 * twin.hip_height:.4g} mm", f"{heights}, or a shorter gait.stride"
+    raise ParameterError(problem, field="twin.hip_height", value=given, allowed=allowed)
 
 
 def twin_of(robot: Robot) -> Twin:

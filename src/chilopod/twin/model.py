@@ -19,6 +19,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 
+from chilopod.engine.arguments import require
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array, read_only
 from chilopod.ground import GRAVITY
@@ -42,35 +43,27 @@ _POLE_HEIGHT = 0.4  # m
 _SCANNER_ABOVE = 0.03  # m, of its beams above the body
 _SUNK = 1e-6  # m, depth of feet at the start; at 0 round-off would decide which of them touch the floor
 _ROLLING = (0.0, 0.0)  # feet do not resist turning on the spot nor rolling
+_UNTOUCHED = {"contype": 0, "conaffinity": 0}  # geoms but the feet and the floor
 
 
 class TwinModel:
-    """A robot compiled for MuJoCo, and the indices of its parts in MuJoCo's arrays; ParameterError if MuJoCo cannot
-    build it.
+    """A robot with a table [twin], compiled for MuJoCo, and the indices of its parts in MuJoCo's arrays; ParameterError
+    if MuJoCo cannot build it.
 
-    Parameters
-    ----------
-    robot
-        Robot with a table [twin].
-    forces
-        True to measure the force on every foot (sensors, in the order of :attr:`feet`).
-    edit
-        Function that changes MuJoCo's description of the robot, see :class:`chilopod.twin.Edited`.
+    With ``forces`` the force on every foot is measured (sensors, in the order of :attr:`feet`). For ``edit`` see
+    :class:`chilopod.twin.Edited`.
 
     Attributes
     ----------
-    robot, twin
-        As given.
     model
         Compiled model, not to be changed.
     yaw_joints, yaw_positions, yaw_rates
         Numbers of the yaw joints, front to rear, and their indices in ``qpos`` and ``qvel``, (N-1,).
     feet
         Geom of every foot, (N, 2).
-    leg_positions, leg_controls
-        Indices of hip and knee in ``qpos``, and of their servos in ``ctrl``, (N, 2, 2).
-    leg_yaw_positions, leg_yaw_controls
-        Indices of the leg yaw joints of module 1, likewise, (2,).
+    leg_positions, leg_controls, leg_yaw_positions, leg_yaw_controls
+        Indices of hip and knee in ``qpos``, and of their servos in ``ctrl``, (N, 2, 2); and likewise of the leg yaw
+        joints of module 1, (2,).
     spring_controls
         Indices in ``ctrl`` of the actuators that change the springs, (N-1,), in N*m/rad above the spring's own
         stiffness; empty without such actuators.
@@ -139,8 +132,7 @@ def build(robot: Robot, forces: bool = False, edit: Edit | None = None) -> mujoc
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,
         size=[twin.pole_radius, 0.5 * _POLE_HEIGHT, 0.0],
         pos=[0.0, 0.0, 0.5 * _POLE_HEIGHT],
-        contype=0,
-        conaffinity=0,
+        **_UNTOUCHED,
         mass=0.0,
         group=POLE_GROUP,
         rgba=[0.84, 0.37, 0.0, 1.0],
@@ -226,22 +218,15 @@ def _legs(module: int) -> list[str]:
 
 
 def _check_bodies(robot: Robot, twin: Twin) -> None:
-    if 4.0 * twin.link_mass >= robot.module_mass:
-        problem = "must leave mass for the body: a module has four links"
-        allowed = f"less than {0.25 * robot.module_mass:.4g} kg"
-        raise ParameterError(problem, field="twin.link_mass", value=f"{twin.link_mass:g} kg", allowed=allowed)
-    if 0.5 * twin.body_height >= twin.hip_height + twin.foot_radius:
-        problem = "must keep the body above the floor"
-        allowed = f"less than {2e3 * (twin.hip_height + twin.foot_radius):g} mm"
-        raise ParameterError(problem, field="twin.body_height", value=f"{1e3 * twin.body_height:g} mm", allowed=allowed)
-    low, high = yaw_inertia_range(robot.body, robot.legs, twin)
-    if not low <= robot.module_yaw_inertia <= high:
-        raise ParameterError(
-            "must fit the mass and size of the module and its legs",
-            field="body.yaw_inertia",
-            value=f"{robot.module_yaw_inertia:.4g} kg*m^2",
-            allowed=f"{low:.4g} to {high:.4g} kg*m^2",
-        )
+    most = 0.25 * robot.module_mass
+    problem, allowed = "must leave mass for the body: a module has four links", f"less than {most:.4g} kg"
+    require(twin.link_mass < most, problem, "twin.link_mass", f"{twin.link_mass:g} kg", allowed)
+    height, above = twin.body_height, twin.hip_height + twin.foot_radius
+    problem, allowed = "must keep the body above the floor", f"less than {2e3 * above:g} mm"
+    require(0.5 * height < above, problem, "twin.body_height", f"{1e3 * height:g} mm", allowed)
+    (low, high), inertia = yaw_inertia_range(robot.body, robot.legs, twin), robot.module_yaw_inertia
+    problem, allowed = "must fit the mass and size of the module and its legs", f"{low:.4g} to {high:.4g} kg*m^2"
+    require(low <= inertia <= high, problem, "body.yaw_inertia", f"{inertia:.4g} kg*m^2", allowed)
 
 
 def _add_box(body: mujoco.MjsBody, robot: Robot, twin: Twin) -> None:
@@ -255,8 +240,7 @@ def _add_box(body: mujoco.MjsBody, robot: Robot, twin: Twin) -> None:
         name=f"{body.name}_box",
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[0.46 * length, 0.5 * width, 0.5 * height],
-        contype=0,
-        conaffinity=0,
+        **_UNTOUCHED,
         rgba=[0.62, 0.68, 0.74, 1.0],
     )
 
@@ -281,8 +265,7 @@ def _add_leg(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[0.0, 0.0, 0.0, 0.0, 0.0, -length],
             size=[0.8 * twin.foot_radius, 0.0, 0.0],
-            contype=0,
-            conaffinity=0,
+            **_UNTOUCHED,
             rgba=[0.25, 0.29, 0.34, 1.0],
         )
     lower.add_geom(

@@ -34,6 +34,10 @@ def simulate(
 ) -> xr.Dataset:
     """Simulate walks of robots on the floor; the robots do not interact.
 
+    The dataset is as that of :func:`chilopod.planar.simulate`, with ``leg_yaw`` as measured at the joints, not as
+    commanded; with a target and a controller also ``seen_bearing`` and ``seen_distance`` over (event, robot), observed
+    by the controller, NaN where the pole was out of view; with ``poses``, ``pose`` over (time, robot, coordinate).
+
     Parameters
     ----------
     robots, initial, friction, target, seeds, threads, tolerance
@@ -46,12 +50,6 @@ def simulate(
         Samples per second, taken at the nearest step.
     poses
         True to add the positions of all joints, from which the robot can be drawn.
-
-    Returns
-    -------
-    Dataset as that of :func:`chilopod.planar.simulate`, with ``leg_yaw`` as measured at the joints, not as commanded;
-    with a target and a controller also ``seen_bearing`` and ``seen_distance`` over (event, robot), observed by the
-    controller, NaN where the pole was out of view; with ``poses``, ``pose`` over (time, robot, coordinate).
     """
     in_range("duration", duration, LONGEST, "s")
     recording = Recording(rate, forces, poses)

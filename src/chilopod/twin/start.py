@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chilopod.engine import Traits
-from chilopod.engine.arguments import as_number, as_robot, as_robots, check_wishes, standing
+from chilopod.engine.arguments import as_number, as_robot, as_robots, check_wishes, require, standing
 from chilopod.engine.batch import begin, resumed
-from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.record import Recording, in_range
 from chilopod.robot import Robot
@@ -26,7 +25,6 @@ traits = Traits(
     noisy=True,
     poses=True,
     robots_per_core=4,
-    walks_per_round=8,
     duration_ratio=2.8,
     version=f"MuJoCo {mujoco.__version__}",
 )
@@ -46,18 +44,10 @@ def initial_states(
     *,
     edit: Edit | None = None,
 ) -> Array:
-    """States of robots that are about to walk: at rest, feet where the gait has them at time 0.
+    """States of robots with a twin that are about to walk, see :class:`chilopod.engine.Engine`: at rest, feet where the
+    gait has them at time 0.
 
-    Parameters
-    ----------
-    robot, joint_angles, heading, position
-        See :class:`chilopod.engine.Engine`; a robot with a twin.
-    edit
-        See :class:`Edited`.
-
-    Returns
-    -------
-    Positions of all joints (MuJoCo's ``qpos``), shape (robots, nq).
+    They are the positions of all joints (MuJoCo's ``qpos``), shape (robots, nq). For ``edit`` see :class:`Edited`.
     """
     plan = compiled(common(robot), edit=edit)
     angles, headings, places = standing(robot, joint_angles, heading, position)
@@ -82,12 +72,11 @@ def start(
     edit: Edit | None = None,
     traits: Traits = traits,
 ) -> TwinWalk:
-    """Start walks on the floor, see :class:`chilopod.engine.Engine`.
+    """Start walks on the floor, see :class:`chilopod.engine.Engine`, of robots that may differ only in the numbers of
+    their springs.
 
     Parameters
     ----------
-    robots, friction, record, expected
-        See :class:`chilopod.engine.Engine`. Robots may differ only in the numbers of their springs.
     initial
         From :func:`initial_states`, shape (walks, nq) or (nq,), or from ``states`` of a walk, (walks, nq + nv).
     target
@@ -102,18 +91,14 @@ def start(
         See :class:`Edited`.
     """
     tolerance, expected = in_range("tolerance", tolerance, 1.0), check_wishes(record, expected)
-    if as_number("threads", threads) not in range(1 << 16):
-        raise ParameterError("must be a thread count", field="threads", value=threads, allowed="0 (all cores) or more")
-    if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
-        raise ParameterError(
-            "must be a function and the traits of an engine",
-            field="edit, traits",
-            allowed="a function or None; a chilopod.engine.Traits",
-        )
+    count = as_number("threads", threads) in range(1 << 16)
+    require(count, "must be a thread count", "threads", threads, "0 (all cores) or more")
+    allowed = "a function or None; a chilopod.engine.Traits"
+    fits = callable(edit or common) and isinstance(traits, Traits)  # type: ignore[redundant-expr]
+    require(fits, "must be a function and the traits of an engine", "edit, traits", allowed=allowed)
     given = as_robots(robots)
     first = common(given[0])
-    if any(common(each) != first for each in given[1:]):
-        raise ParameterError("must be equal except for their springs", field="robots")
+    require(all(common(each) == first for each in given[1:]), "must be equal except for their springs", "robots")
     size, standing_still = state_size(compiled(first, edit=edit), initial), initial_states(given[0], edit=edit)
     begun = begin(given, standing_still, size, initial, friction, target, seeds)
     return TwinWalk(begun, record, tolerance, expected, traits=traits, threads=int(threads), edit=edit)

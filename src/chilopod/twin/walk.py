@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,16 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.cores import cores
 from chilopod.engine import Command, Observation, Ramps, Status, Traits, one_thread
-from chilopod.engine.arguments import as_array, as_marks, as_seeds, check_time, rows_anew
+from chilopod.engine.arguments import as_array, as_marks, as_seeds, check_time, require, rows_anew
 from chilopod.engine.batch import BatchWalk, Beginning
+from chilopod.engine.contract import Marks
 from chilopod.engine.saved import part
-from chilopod.errors import ParameterError
 from chilopod.frozen import Array
-from chilopod.record import Recording, Samples, check_size, walk_record
+from chilopod.record import Recording, Samples, check_size, quantity, walk_record
 from chilopod.twin.failures import failures
 from chilopod.twin.legs import servo_targets
 from chilopod.twin.model import AWAY, SIDES, Edit, TwinModel, compiled, silence, without_springs
-from chilopod.twin.samples import Sampling
 from chilopod.twin.scanner import Scanner, rotation
 
 TOLERANCE = 1e-8
@@ -36,6 +36,26 @@ _TARGETS_AHEAD = 2048  # ticks for which servo targets are computed at a time
 _SAME_INSTANT = 1e-9  # ticks
 _STATE = ("time", "qpos", "qvel", "qacc_warmstart", "qfrc_applied")
 """Fields of MuJoCo's state that differ between walks and are not set before every step."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Samples at the steps nearest to their times, from samples per second, 0 for none, and the timestep, s."""
+
+    rate: float
+    timestep: float
+
+    def steps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Steps of samples, of their shape."""
+        return np.rint(samples / (self.rate or 1.0) / self.timestep).astype(np.intp)
+
+    def count(self, step: int) -> int:
+        """Number of samples up to a step."""
+        if self.rate == 0.0 or step < 0:
+            return 0
+        in_a_step = self.rate * self.timestep
+        near = int(step * in_a_step) + np.arange(-2, 4 + int(in_a_step))
+        return int(near[self.steps(near) <= step][-1]) + 1
 
 
 @one_thread
@@ -73,19 +93,17 @@ class TwinWalk(BatchWalk):
         self._put_poles()
         self._leg_yaw = Ramps(np.zeros((count, 2)))
         self._tick = 0
-        self._status = [Status.WALKED] * count
-        self._walking = np.arange(count)
+        self._status = np.full(count, Status.WALKED, dtype=object)
         self._servos_from, self._servos = 0, np.empty((0, plan.leg_controls.size))
-        self._seen: list[tuple[Array, Array]] = []
+        self._seen: list[Array] = []
 
-        rows = self._expected_rows
         self._sampling = Sampling(record.rate if record else 0.0, plan.twin.timestep)
-        self._positions = Samples((count, plan.model.nq), rows)
-        self._rates = Samples((count, plan.model.nv), rows)
-        self._forces = Samples((count, plan.model.nsensordata), rows if plan.model.nsensordata else 0)
-        for sample in self._sampling.between(-1, 0):  # several, if sampled more often than stepped
-            for name, store in (("qpos", self._positions), ("qvel", self._rates)):
-                store.grown(sample + 1)[sample] = self._batch.bind(name)
+        sizes = {"qpos": plan.model.nq, "qvel": plan.model.nv, "sensordata": plan.model.nsensordata}
+        # Recorded quantities, by MuJoCo's name.
+        self._kept = {name: Samples((count, size), self._expected_rows) for name, size in sizes.items() if size}
+        start = self._sampling.count(0)  # several, if sampled more often than stepped
+        for name in ("qpos", "qvel") if start else ():
+            self._kept[name].grown(start)[:] = self._batch.bind(name)
 
     @property
     def _longest_stretch(self) -> int:
@@ -93,13 +111,9 @@ class TwinWalk(BatchWalk):
         model, twin = self._plan.model, self._plan.twin
         numbers = model.nq + model.nv + model.nu + model.nsensordata
         most = _MOST_KEPT / (len(self._robots) * self._plan.steps_per_control * numbers)
-        if most < 1.0:
-            raise ParameterError(
-                f"must be shorter: no memory for {self._plan.steps_per_control:g} steps of {len(self._robots)} robots",
-                field="twin.control_interval",
-                value=f"{twin.control_interval:g} s",
-                allowed=f"{most * twin.control_interval:.2g} s or less with this timestep",
-            )
+        problem = f"must be shorter: no memory for {self._plan.steps_per_control:g} steps of {len(self._robots)} robots"
+        given, allowed = twin.control_interval, f"{most * twin.control_interval:.2g} s or less with this timestep"
+        require(most >= 1.0, problem, "twin.control_interval", f"{given:g} s", allowed)
         return max(1, int(min(_LONGEST_STRETCH / twin.control_interval, most)))
 
     @property
@@ -108,15 +122,15 @@ class TwinWalk(BatchWalk):
         return tuple(self._status)
 
     def observe(self) -> Observation:
-        bearing, distance = self._look()
         angles = self._batch.bind("qpos")[:, self._plan.yaw_positions].copy()
-        angles[~self._on_foot()] = np.nan
+        angles[self._gone] = np.nan
+        bearing, distance = self._look()
         return self._observation(bearing, distance, angles)
 
     def pose(self) -> Array:
         places = self._batch.bind("qpos")[:, :7]
         pose = np.column_stack([places[:, :2], _heading(rotation(places[:, 3:]))])
-        pose[~self._on_foot()] = np.nan
+        pose[self._gone] = np.nan
         return pose
 
     def aim(self, target: ArrayLike) -> None:
@@ -124,34 +138,24 @@ class TwinWalk(BatchWalk):
         self._targets.move(self._time, target)
         self._put_poles()
 
-    def halt(self, which: NDArray[np.bool_]) -> None:
-        marked = as_marks("which", which, len(self._robots)) & self._on_foot()
-        self._status = [Status.HALTED if ends else each for ends, each in zip(marked, self._status, strict=True)]
-        self._walking = np.flatnonzero(self._on_foot())
+    def halt(self, which: Marks) -> None:
+        self._status[as_marks("which", which, len(self._robots)) & ~self._gone] = Status.HALTED
 
     def states(self) -> Array:
         states = np.hstack([self._batch.bind("qpos"), self._batch.bind("qvel")])
-        states[~self._on_foot()] = np.nan
+        states[self._gone] = np.nan
         return states
 
     def restart(
-        self,
-        which: NDArray[np.bool_],
-        initial: ArrayLike,
-        friction: ArrayLike | None = None,
-        seeds: Sequence[int] | None = None,
+        self, which: Marks, initial: ArrayLike, friction: ArrayLike | None = None, seeds: Sequence[int] | None = None
     ) -> None:
         """See :class:`chilopod.engine.Walk`; the times of the scans do not change."""
-        arguments = {
-            "initial": (initial, (state_size(self._plan, initial),)),
-            "friction": (friction, self._factors.shape[1:]),
-        }
+        size = (state_size(self._plan, initial),)
+        arguments = {"initial": (initial, size), "friction": (friction, self._factors.shape[1:])}
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
         states, ids = rows["initial"], np.flatnonzero(marked)
-        if seeds is not None and self._seeds is None:
-            raise ParameterError(
-                "must be None: this walk has no noise", field="seeds", allowed="None, or seeds at the start"
-            )
+        noisy = seeds is None or self._seeds is not None
+        require(noisy, "must be None: this walk has no noise", "seeds", allowed="None, or seeds at the start")
         if states is None:
             return
         self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -163,13 +167,12 @@ class TwinWalk(BatchWalk):
             self._seeds[ids] = as_seeds(seeds)
         self._actuators.restart(marked)
         self._leg_yaw.restart(marked)
-        self._status = [Status.WALKED if anew else each for anew, each in zip(marked, self._status, strict=True)]
-        self._walking = np.flatnonzero(self._on_foot())
+        self._status[marked] = Status.WALKED
         self._scanner.restart(ids, anew=seeds is not None)
         self._put_poles()
 
     def command(self, command: Command) -> None:
-        self._actuators.command(self._time, command, self._on_foot())
+        self._actuators.command(self._time, command, ~self._gone)
         if command.leg_yaw is not None:
             ticks = max(1, round(command.within / self._plan.twin.control_interval))
             self._leg_yaw.to(self._actuators.leg_yaw, self._tick, ticks)
@@ -185,30 +188,27 @@ class TwinWalk(BatchWalk):
         with silence():
             while self._tick < last:
                 tick = min(last, self._tick + longest)
-                if len(self._walking):
+                if not self._gone.all():
                     self._step_to(tick)
                 else:  # scans are counted all the same, for robots that are restarted
                     self._scanner.passed(self._tick, tick, np.empty((0, tick - self._tick, 7)), self._walking)
                 self._tick = tick
         self._time = until
-        if not len(self._walking):
-            # All robots have stopped; the record continues with NaN.
-            for store in self._kept().values():
+        if self._gone.all():
+            # The record continues with NaN.
+            for store in self._kept.values():
                 store.grown(self._sampling.count(self._tick * self._plan.steps_per_control))
 
     def _maker(self) -> Any:
         return partial(TwinWalk, traits=self.traits, threads=0, edit=self._edit)
 
     def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        settings = {
-            "seeds": None if self._seeds is None else self._seeds.tolist(),
-            "tick": self._tick,
-            "status": [each.name for each in self._status],
-        }
+        seeds = None if self._seeds is None else self._seeds.tolist()
+        settings = {"seeds": seeds, "tick": self._tick, "status": [each.name for each in self._status]}
         return settings, {
             "states": self._batch.bind("qpos"),
             **{f"state_{name}": self._batch.bind(name) for name in _STATE},
-            **{f"samples_{name}": samples.rows for name, samples in self._kept().items()},
+            **{f"samples_{name}": samples.rows for name, samples in self._kept.items()},
             **{f"yaw_{name}": values for name, values in self._leg_yaw.state().items()},
             **{f"scan_{name}": values for name, values in self._scanner.state().items()},
             "seen": np.array(self._seen).reshape(-1, 2, len(self._robots)),
@@ -216,22 +216,21 @@ class TwinWalk(BatchWalk):
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         super().restore(settings, arrays)
-        self._tick, self._status = operator.index(settings["tick"]), [Status[name] for name in settings["status"]]
-        self._walking = np.flatnonzero(self._on_foot())
+        self._tick, self._status[:] = operator.index(settings["tick"]), [Status[name] for name in settings["status"]]
         for name in _STATE:
             self._batch.bind(name)[:] = arrays[f"state_{name}"]
-        for name, samples in self._kept().items():
+        for name, samples in self._kept.items():
             rows = arrays[f"samples_{name}"]
             samples.grown(len(rows))[:] = rows
         self._leg_yaw.restore(part(arrays, "yaw_"))
-        self._seen = [(each[0], each[1]) for each in arrays["seen"]]
+        self._seen = list(arrays["seen"])
         self._scanner.restore(part(arrays, "scan_"))
         self._put_poles()
 
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
         """Record so far, see :func:`chilopod.twin.simulate`; without a copy if the walk ends here."""
         plan, count = self._plan, 0 if self._record is None else len(self._record.samples(self._time))
-        positions, rates = (each.grown(0)[:count] for each in (self._positions, self._rates))
+        positions, rates = (self._kept[name].grown(0)[:count] for name in ("qpos", "qvel"))
         positions, rates = (each.copy() if copy else each for each in (positions, rates))
         turn = rotation(positions[..., 3:7])
         times = np.asarray(self._sampling.steps(np.arange(len(positions))) * plan.twin.timestep, dtype=np.float64)
@@ -249,25 +248,23 @@ class TwinWalk(BatchWalk):
         self._actuators.add_to(data)
         if self._seen and self._targets.recorded(times) is not None:
             seen = np.array(self._seen)
-            data["seen_bearing"] = (("event", "robot"), seen[:, 0], {"units": "rad"})
-            data["seen_distance"] = (("event", "robot"), seen[:, 1], {"units": "m"})
+            data["seen_bearing"] = quantity("seen_bearing", seen[:, 0])
+            data["seen_distance"] = quantity("seen_distance", seen[:, 1])
         if self._record and self._record.forces:
-            known = self._forces.rows[:count]
+            known = self._kept["sensordata"].rows[:count]
             forces = np.full((count, *known.shape[1:]), np.nan)  # at time 0 they are those of a step that is to come
             forces[: len(known)] = known
-            shape = (*forces.shape[:2], plan.robot.body.modules, len(SIDES), 3)
-            data.coords["module"] = np.arange(1, plan.robot.body.modules + 1)
-            over = ("time", "robot", "module", "side")
             # The sensor gives the force of the foot on the floor.
-            data["foot_force"] = ((*over, "axis"), -forces.reshape(shape)[..., :2], {"units": "N"})
-            data["foot_load"] = (over, -forces.reshape(shape)[..., 2], {"units": "N"})
+            forces = -forces.reshape(*forces.shape[:2], plan.robot.body.modules, len(SIDES), 3)
+            data.coords["module"] = np.arange(1, plan.robot.body.modules + 1)
+            data["foot_force"] = quantity("foot_force", forces[..., :2])
+            data["foot_load"] = quantity("foot_load", forces[..., 2])
         if self._record and self._record.poses:
-            data["pose"] = (("time", "robot", "coordinate"), positions, {"units": "m, 1, rad: MuJoCo's qpos"})
+            data["pose"] = quantity("pose", positions)
         self._finish(data, times)
         return data
 
     # -- inside
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _put(self, ids: NDArray[np.intp], states: Array) -> None:
         """Set the states of robots; at rest, if states have no velocities."""
@@ -280,21 +277,23 @@ class TwinWalk(BatchWalk):
         plan = self._plan
         self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * self._factors
 
-    def _on_foot(self) -> NDArray[np.bool_]:
-        return np.array([each is Status.WALKED for each in self._status])
+    @property
+    def _gone(self) -> Marks:
+        """Mask of the robots that no longer walk."""
+        return np.asarray(self._status != Status.WALKED, dtype=np.bool_)
 
-    def _kept(self) -> dict[str, Samples]:
-        """Recorded quantities, by MuJoCo's name."""
-        kept = {"qpos": self._positions, "qvel": self._rates}
-        return {**kept, "sensordata": self._forces} if self._plan.model.nsensordata else kept
+    @property
+    def _walking(self) -> NDArray[np.intp]:
+        return np.flatnonzero(~self._gone)
 
-    def _look(self) -> tuple[Array, Array]:
-        """Bearing and distance of the target in the last scan; NaN for robots that no longer walk."""
+    def _look(self) -> Array:
+        """Bearing and distance of the target in the last scan, shape (2, robots); NaN for robots that no longer
+        walk."""
         seen = np.full((2, len(self._robots)), np.nan)
-        looking = self._walking[self._targets.there[self._walking]]
+        looking = np.flatnonzero(self._targets.there & ~self._gone)
         if len(looking):
             seen[:, looking] = self._scanner.look(looking)
-        return seen[0], seen[1]
+        return seen
 
     def _put_poles(self) -> None:
         """Move the poles to the targets."""
@@ -307,18 +306,18 @@ class TwinWalk(BatchWalk):
         plan, batch, walking = self._plan, self._batch, self._walking
         per_tick = plan.steps_per_control
         first, count = self._tick * per_tick, (tick - self._tick) * per_tick
-        kept = self._kept()
+        kept = self._kept
         before = batch.bind("qpos")[walking], batch.bind("qvel")[walking]
         out = batch.rollout(count, self._controls(tick), record=list(kept), ids=walking)
         self._scanner.passed(self._tick, tick, out["qpos"][:, per_tick - 1 :: per_tick, :7], walking)
-        samples = self._sampling.between(first, first + count)
+        samples = np.arange(self._sampling.count(first), self._sampling.count(first + count))
         at = self._sampling.steps(samples) - first - 1
         for name, store in kept.items():
             if samples.size:
                 store.grown(samples[-1] + 1)[np.ix_(samples, walking)] = np.swapaxes(out[name][:, at], 0, 1)
         if self._tick == 0 and "sensordata" in kept:  # forces are of the step before, at time 0 of the step after
-            start = self._sampling.between(-1, 0)
-            self._forces.grown(len(start))[np.ix_(start, walking)] = out["sensordata"][:, 0]
+            start = self._sampling.count(0)
+            kept["sensordata"].grown(start)[:start, walking] = out["sensordata"][:, 0]
         warned = batch.warning[walking].any(axis=tuple(range(1, batch.warning.ndim)))
         found = failures(out["qpos"], out["qvel"], before, plan.yaw_positions, warned)
         for row, (step, status) in found.items():
@@ -328,7 +327,6 @@ class TwinWalk(BatchWalk):
         if found:
             # The later states of a failed robot depend on the division of time, so it is reset.
             ended = walking[list(found)]
-            self._walking = np.delete(walking, list(found))
             batch.reset(ended, stage=mujoco.mjtStage.mjSTAGE_NONE)
             self._scanner.restart(ended, anew=False)
             self._put_poles()
@@ -339,9 +337,8 @@ class TwinWalk(BatchWalk):
         control = np.zeros((len(self._walking), len(ticks), plan.model.nu))
         # Both legs at the knees and hips, then the yaw of module 1's.
         control[..., plan.leg_controls.ravel()] = self._leg_targets(ticks)
-        control[..., plan.leg_yaw_controls] = np.swapaxes(self._leg_yaw.at(ticks.astype(np.float64)), 0, 1)[
-            self._walking
-        ]
+        leg_yaw = np.swapaxes(self._leg_yaw.at(ticks.astype(np.float64)), 0, 1)
+        control[..., plan.leg_yaw_controls] = leg_yaw[self._walking]
         control = np.repeat(control, per_tick, axis=1)
         if self._actuators.driven.any() and len(plan.spring_controls):
             edges = np.arange(self._tick * per_tick, tick * per_tick + 1) * plan.twin.timestep
@@ -369,5 +366,4 @@ def state_size(plan: TwinModel, initial: ArrayLike | None) -> int:
 
 def _heading(turn: Array) -> Array:
     """Heading of rotation matrices (..., 3, 3), rad."""
-    heading: Array = np.arctan2(turn[..., 1, 0], turn[..., 0, 0])
-    return heading
+    return np.asarray(np.arctan2(turn[..., 1, 0], turn[..., 0, 0]))
