@@ -230,6 +230,54 @@ def test_coefficients_do_not_hang_on_where_an_orbit_is_met(state):
     np.testing.assert_allclose(curve.points[0].mode, point.mode * np.sign(point.mode @ curve.points[0].mode), atol=1e-7)
 
 
+@pytest.mark.parametrize("angle", [1.0, np.pi, 1.5 * np.pi, 5.0])
+def test_coefficients_do_not_hang_on_where_an_orbit_with_an_event_is_met(angle):
+    """r' = s r, phi' = 1, and a reset whose return map is u -> -(1 + p) u - 0.4 u^3 in u = r - 2.
+
+    The mode u e^(s t) / sqrt(1 + s^2) across the motion jumps back at the event.
+    """
+    s = -0.05
+    decay = np.exp(2.0 * np.pi * s)
+
+    def family(p):
+        def reset(t, x):
+            u = x[0] - 2.0
+            return [(2.0 - (1.0 + p) * u - 0.4 * u**3) / decay, 0.0 * x[0]]
+
+        back = Event(lambda t, x: x[1], reset, direction=1)
+        return from_rhs(
+            lambda t, x: [s * x[0] - x[1], s * x[1] + x[0]], 2, None, events=[back], guess_period=2.0 * np.pi
+        )
+
+    r = 2.0 * np.exp(s * (angle - 2.0 * np.pi))
+    (point,) = locate(family, (-0.3, 0.3), orbit=[r * np.cos(angle), r * np.sin(angle)])
+    unit = (1.0 + s * s) * 4.0 * np.pi * s / (1.0 - np.exp(-4.0 * np.pi * s))  # squared u of a mean square of 1
+    assert abs(point.coefficient - 0.8 * unit) <= point.coefficient_error < 1e-7
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.5, 4.5])
+def test_a_pair_that_jumps_at_an_event(angle):
+    """w' = (a + 0.2 + 0.37 i - |w|^2) w round a circle, and w is multiplied by e^(-0.4 pi) once a turn.
+
+    At a = 0, ln |w| falls by the integral of |w|^2 in a turn, on the average 2 |A|^2 with the amplitude A of a mode of
+    mean square 1.
+    """
+    shrink = np.exp(-0.4 * np.pi)
+
+    def rhs(t, x, a):
+        grow, beside = 1.0 - x[0] ** 2 - x[1] ** 2, a + 0.2 - x[2] ** 2 - x[3] ** 2
+        return [grow * x[0] - x[1], grow * x[1] + x[0], beside * x[2] - 0.37 * x[3], beside * x[3] + 0.37 * x[2]]
+
+    kick = Event(lambda t, x, a: x[1], lambda t, x, a: [x[0], x[1], shrink * x[2], shrink * x[3]], direction=1)
+    found = locate(
+        lambda a: from_rhs(rhs, 4, None, args=(a,), events=[kick], guess_period=6.3),
+        (-0.3, 0.4),
+        orbit=[np.cos(angle), np.sin(angle), 0.0, 0.0],
+    )
+    (point,) = found
+    assert abs(point.coefficient + 4.0 * np.pi) <= point.coefficient_error < 1e-6
+
+
 @pytest.mark.parametrize("state", [[1.0, 0.0, -0.3], [1.0, 0.0, 0.3], [1.2, 0.0, 0.0], [0.54, 0.84, 0.0]])
 def test_a_fold_of_an_orbit_with_twist(state):
     """The cycles r^2 = 1 +- sqrt(1/4 - l^2) turn at rates that differ, and meet at l = 1/2."""

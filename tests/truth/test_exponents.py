@@ -1,13 +1,13 @@
 """Exponents of systems whose multipliers lie dozens of orders of magnitude apart."""
 
-from math import log, pi
+from math import exp, log, pi, sqrt
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError
-from chilopod.stability import PeriodicSystem, exponents
+from chilopod.stability import Event, PeriodicSystem, exponents, from_map, from_rhs
 from chilopod.stability.spectrum import split_leading
 from helpers.systems import linear
 
@@ -110,3 +110,58 @@ def test_leading_directions_of_a_factor_that_makes_nothing_of_the_others():
     logarithms, vectors = split_leading([np.diag([2.0, 0.0])], 1)
     np.testing.assert_allclose(logarithms, [log(2.0)], rtol=1e-15)
     np.testing.assert_allclose(vectors, [[1.0], [0.0]], atol=1e-15)
+
+
+def kicked(reset):
+    """x' = -x, y' = -2 y, with a reset in the middle of the period 1."""
+    kick = Event(lambda t, x: np.sin(np.pi * (t - 0.5)), reset)
+    return from_rhs(lambda t, x: [-x[0], -2.0 * x[1]], 2, 1.0, events=[kick])
+
+
+@pytest.mark.parametrize(("d", "sure"), [(1e-3, 1e-8), (1e-8, 1e-4), (1e-12, 1.0)])
+def test_a_nearly_singular_reset(d, sure):
+    """Multipliers with the sum exp(-1) + (2 + d) exp(-2) and the product d exp(-3)."""
+    found = exponents(kicked(lambda t, x: [x[0] + x[1] + 0.1, 2.0 * x[0] + (2.0 + d) * x[1]]), [0.1, 0.1])
+    own = (2.0 + d) - 2.0  # of the reset as rounded
+    total = exp(-1.0) + (2.0 + d) * exp(-2.0)
+    first = 0.5 * (total + sqrt(total**2 - 4.0 * own * exp(-3.0)))
+    expected = [log(first), log(own * exp(-3.0) / first)]
+    assert (np.abs(found.values - expected) <= found.error_bound).all()
+    assert found.error_bound[0] < 1e-11
+    assert found.error_bound[1] < sure
+
+
+def test_a_singular_reset():
+    """Multipliers 3 / e + 6 / e^2 and 0."""
+    system = kicked(lambda t, x: [3.0 * (x[0] + x[1]), 6.0 * (x[0] + x[1])])
+    with pytest.raises(AnalysisError, match=r"contracts too strongly.*resolved=True"):
+        exponents(system, [0.0, 0.0])
+    found = exponents(system, [0.0, 0.0], resolved=True)
+    np.testing.assert_allclose(found.values, [log(3.0 * exp(-1.0) + 6.0 * exp(-2.0))], rtol=1e-12)
+    assert str(found).endswith("of 1 more the multipliers are zero, or too small to be resolved")
+
+
+@pytest.mark.parametrize("angle", [pi, 1.0, 0.5 * pi])
+def test_a_reset_of_an_orbit_of_its_own_period(angle):
+    """r' = -0.05 r, phi' = 1; after a turn r becomes 2 g^-1 + k (r - 2) g^-1, g the decay over a turn."""
+
+    def spiral(k):
+        decay = exp(-0.1 * pi)
+        back = Event(lambda t, x: x[1], lambda t, x: [(2.0 + k * (x[0] - 2.0)) / decay, 0.0 * x[1]], direction=1)
+        start = 2.0 * exp(-0.05 * (angle - 2.0 * pi)) * np.array([np.cos(angle), np.sin(angle)])
+        system = from_rhs(
+            lambda t, x: [-0.05 * x[0] - x[1], -0.05 * x[1] + x[0]], 2, None, events=[back], guess_period=6.3
+        )
+        return exponents(system, start)
+
+    for k in (-0.5, 1e-9):
+        np.testing.assert_allclose(spiral(k).values.real, [log(abs(k)) / (2.0 * pi)], rtol=1e-6)
+    with pytest.raises(AnalysisError, match="contracts too strongly"):
+        spiral(0.0)
+
+
+def test_a_map_of_poor_condition():
+    """A map has no parts that could be halved: eigenvalues 1 and 1e-9."""
+    matrix = 0.5 * np.array([[1.0 + 1e-9, 1.0 - 1e-9], [1.0 - 1e-9, 1.0 + 1e-9]])
+    found = exponents(from_map(lambda x: (matrix @ x, matrix), 2), [0.0, 0.0])
+    np.testing.assert_allclose(found.values, [0.0, log(1e-9)], atol=1e-6)

@@ -121,7 +121,10 @@ class Exponents(Shown, ReadOnlyArrays):
         pairs = zip(self.values, self.error_bound, strict=True)
         table = rows((number(value), f"± {bound:.1e} / unit of time") for value, bound in pairs)
         period, stable = self.multipliers.period, self.multipliers.stable
-        return [f"Exponents: {self.values.size} of an orbit of period {period:.10g}, {VERDICTS[stable]}", *table]
+        less = self.multipliers.values.size - self.values.size
+        remarks = [f"of {less} more the multipliers are zero, or too small to be resolved"] if less else []
+        heading = f"Exponents: {self.values.size} of an orbit of period {period:.10g}, {VERDICTS[stable]}"
+        return [heading, *table, *said(remarks)]
 
 
 def _multipliers(orbit: Orbit) -> Multipliers:
@@ -221,8 +224,9 @@ def exponents(
     """All Floquet exponents and modes, including strongly damped ones; other arguments as for :func:`multipliers`.
 
     The state space is split along factors of the period: a multiplier of 1e-60 is relatively as accurate as one of 0.5.
-    Where a flow contracts too strongly for that, an AnalysisError says so; with ``resolved`` the exponents of the
-    multipliers that are resolved without it are returned, those of largest modulus.
+    Where a flow contracts too strongly for that, as with a reset of a state to a constant, whose multiplier is zero, an
+    AnalysisError says so; with ``resolved`` the exponents of the multipliers that are resolved without it are returned,
+    those of largest modulus.
     """
     with Deadline(seconds):
         found = find_orbit(system, orbit)

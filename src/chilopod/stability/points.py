@@ -9,10 +9,13 @@ Several modes due to a symmetry are turned along the new orbits (``_modes``).
 from __future__ import annotations
 
 import contextlib
+import math
+from bisect import bisect
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import Legendre
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.carrying import numerical_balance
@@ -181,8 +184,15 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
         return [*lines, f"{state}: {in_one_line(self.orbit)}", f"critical mode: {mode}"]
 
 
-_FEWEST_PARTS, _MOST_PARTS = 32, 2048  # parts of a return; a smooth periodic mean converges geometrically
-_SETTLED = 1e-7  # change of the mean from half as many parts; its error is about the square of that
+# Lobatto's nodes and weights on a part of a return: an event leaves some of them on either side.
+_DEGREE = Legendre.basis(7)
+_NODES = 0.5 + 0.5 * np.concatenate([[-1.0], _DEGREE.deriv().roots().real, [1.0]])
+_WEIGHTS = 1.0 / (_NODES.size * (_NODES.size - 1) * _DEGREE(2.0 * _NODES - 1.0) ** 2)
+# Where a part is cut: no event is there by symmetry, where round-off decides whether a state is before it or after it.
+_CUT = math.sqrt(2.0) - 1.0
+_LONGEST, _SHORTEST = 0.3, 1e-10  # longest part, and the length of one with an event
+_SETTLED = 1e-9  # change of a part's share by cutting it, relative to that of the mean: far above its error
+_MOST_PARTS = 512  # where the flow is not as accurate as that
 
 _ASIDE, _ROUNDS = 0.05, 20  # distance of a second orbit, in sizes of the states, and number of its corrections
 _CRITICAL = 1e-6  # distance from one of a critical multiplier, and relative singular value of its direction
@@ -276,27 +286,37 @@ def mean_size(system: SystemLike, state: Array, duration: float, mode: ComplexAr
     if not is_autonomous(system):
         return 1.0
     # The flow carries the velocity as it carries the mode.
-    start = np.stack([mode, velocity_at(system, state)], axis=1)
-    moves: list[tuple[Array, ComplexArray]] = [(state, start)]
+    times, moves = [0.0], [(state, np.stack([mode, velocity_at(system, state)], axis=1))]
 
-    def carried(x: Array, directions: ComplexArray, part: float) -> tuple[Array, ComplexArray]:
-        x, derivative = checked_flow(system, x, 0.0, part * duration)
-        return x, derivative @ directions
+    def mean_square(low: float, high: float) -> float:
+        squares = []
+        for time in (low * (1.0 - _NODES) + high * _NODES).tolist():
+            at = bisect(times, time) - 1
+            x, directions = moves[at]
+            if times[at] < time:
+                x, derivative = checked_flow(system, x, 0.0, (time - times[at]) * duration)
+                directions = derivative @ directions
+                times.insert(at + 1, time)
+                moves.insert(at + 1, (x, directions))
+            vector, velocity = directions.T
+            across = vector - (vector @ velocity) / (velocity @ velocity) * velocity
+            squares.append(float((np.abs(across) ** 2).sum()))
+        return (high - low) * float(_WEIGHTS @ squares)
 
-    def mean_square(moves: list[tuple[Array, ComplexArray]]) -> float:
-        vectors, velocities = np.moveaxis(np.array([directions for _, directions in moves]), 2, 0)
-        along = (vectors * velocities).sum(axis=1) / (velocities * velocities).sum(axis=1)
-        return float((np.abs(vectors - along[:, None] * velocities) ** 2).sum(axis=1).mean())
-
-    for _ in range(_FEWEST_PARTS - 1):
-        moves.append(carried(*moves[-1], 1.0 / _FEWEST_PARTS))
-    mean = mean_square(moves)
-    while True:
-        between = [carried(*move, 0.5 / len(moves)) for move in moves]
-        before, mean = mean, 0.5 * (mean + mean_square(between))
-        moves = [move for pair in zip(moves, between, strict=True) for move in pair]
-        if abs(mean - before) <= _SETTLED * mean or len(moves) >= _MOST_PARTS:
-            return float(np.sqrt(mean))
+    mean = mean_square(0.0, 1.0)
+    parts = [(0.0, 1.0, mean)]
+    for _ in range(_MOST_PARTS):  # cut, down to an event if there is one
+        if not parts:
+            break
+        low, high, before = parts.pop()
+        middle = low + _CUT * (high - low)
+        cut = [(a, b, mean_square(a, b)) for a, b in ((low, middle), (middle, high))]
+        change = cut[0][2] + cut[1][2] - before
+        mean += change
+        length = high - low
+        if length > _LONGEST or (abs(change) > _SETTLED * length * mean and length > _SHORTEST):
+            parts += cut
+    return math.sqrt(mean)
 
 
 def _is_continuum(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> bool:

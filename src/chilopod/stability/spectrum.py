@@ -9,8 +9,9 @@ million.
 
 :func:`split_return` takes the return as a product of many matrices, of which only the slow directions survive
 round-off. Subspace iteration forward through the factors gives the nested spaces of the slowest directions, iteration
-backward through the inverses those of the fastest, and their intersections split the space into groups of like size
-(the Oseledets splitting of a periodic cocycle). The product restricted to a group is small and well scaled.
+backward through their transposes the complements of those of the fastest, and the intersections split the space into
+groups of like size (the Oseledets splitting of a periodic cocycle). The product restricted to a group is small and well
+scaled. Factors may be nearly singular, as a reset of a state to about a constant.
 
 The derivative of a stiff flow does not resolve a direction that decays by e^-1000 within a step of an implicit method,
 and the multipliers do not need it. Its exponent is that of the volume, the integral of the divergence of f (Liouville's
@@ -34,7 +35,7 @@ from scipy.linalg.lapack import dgeqrf, dorgqr
 from chilopod.errors import AnalysisError
 from chilopod.flows.carrying import numerical_balance
 from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
-from chilopod.stability.interface import Capabilities, SystemLike, checked_flow, is_autonomous, is_stiff, sizes
+from chilopod.stability.interface import Capabilities, SystemLike, checked_flow, is_autonomous, is_stiff, offers, sizes
 from chilopod.stability.returns import ReturnMap, flow_with_error, velocity_at
 
 EPSILON = float(np.finfo(float).eps)
@@ -173,7 +174,7 @@ class ContractionError(AnalysisError):
 _TOO_STRONG = "the flow contracts too strongly to be resolved"
 _WORST_CONDITION = 1e6
 _FEWEST, _MOST, _MOST_STIFF = 8, 32768, 4096  # numbers of parts of moderate condition; steps of a stiff flow are costly
-_COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, above which the flow has no parts
+_COMPOSED = 1e-6  # error of the product of parts, relative to the whole, above which they are not its parts
 
 
 class Cut(NamedTuple):
@@ -197,7 +198,7 @@ class _Part(NamedTuple):
 
 def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int = 0) -> Cut:
     """A return from a state on the orbit in parts of moderate condition, apart from the ``unresolved`` fastest
-    directions; AnalysisError if there are none. The return of a map, which has no parts, stays whole."""
+    directions and from events; AnalysisError if there are none. A return without parts, as of a map, stays whole."""
     # The derivative on a section may be only round-off; an orbit that moves gives the sizes. A decayed entry of the
     # diagonal says nothing of its state's size.
     autonomous, duration, one = is_autonomous(system), image.duration, np.eye(x.size)
@@ -208,11 +209,13 @@ def moderate_cut(system: SystemLike, x: Array, image: ReturnMap, unresolved: int
         parts.append(_part(system, parts[-1].state if parts else x, start, end, units))
     ratios = units / units[:, None]
     symmetry = one if system.symmetry is None else system.symmetry * units / units[:, None]
-    if not (autonomous or unresolved):
-        whole = image.jacobian * ratios
-        product = np.linalg.multi_dot([symmetry, *(part.factor for part in reversed(parts))])
-        if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
-            return Cut(units, one, [whole], [np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)])
+    if not unresolved:
+        whole, error = image.jacobian * ratios, np.nan_to_num(np.broadcast_to(image.error, one.shape) * ratios)
+        across = image.across * ratios
+        product = np.linalg.multi_dot([across, symmetry, *(part.factor for part in reversed(parts))])
+        if not _equal(system, product, whole, error):
+            section = section_basis(system, x, units)
+            return Cut(units, section, [section.T @ whole @ section], [np.abs(section.T) @ error @ np.abs(section)])
     parts = _moderate_parts(system, x, parts, units, unresolved)
     sections = [section_basis(system, state, units) for state in (x, *(part.state for part in parts[:-1]))]
     turns = [one] * (len(parts) - 1) + [symmetry]
@@ -228,6 +231,12 @@ def section_basis(system: SystemLike, state: Array, units: Array) -> Array:
     return normal_basis(velocity_at(system, state) / units) if is_autonomous(system) else np.eye(units.size)
 
 
+def _equal(system: SystemLike, product: Array, whole: Array, error: Array) -> bool:
+    """True if a product of parts is the whole, which it is not where an event falls on a border and is lost."""
+    own = error * offers(system, "flow_with_error")  # another bound may stem from such parts
+    return bool((np.abs(product - whole) <= _COMPOSED * np.abs(whole).max() + own).all())
+
+
 def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) -> _Part:
     state, derivative, error = flow_with_error(system, x.copy(), start, end)
     factor = derivative * units / units[:, None]
@@ -235,7 +244,7 @@ def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) 
 
 
 def _moderate_parts(system: SystemLike, x: Array, parts: list[_Part], units: Array, unresolved: int) -> list[_Part]:
-    """Parts of a return; those that contract too strongly are halved repeatedly."""
+    """Parts of a return; those that contract too strongly are halved repeatedly, down to an event if there is one."""
     done: list[_Part] = []
     left, asked, most = parts[::-1], len(parts), _MOST_STIFF if unresolved else _MOST
     while left:
@@ -248,10 +257,16 @@ def _moderate_parts(system: SystemLike, x: Array, parts: list[_Part], units: Arr
             continue
         middle = 0.5 * (part.start + part.end)
         asked += 2
-        if asked > most or not part.start < middle < part.end:
-            raise ContractionError(_TOO_STRONG, field="flow")
         first = _part(system, done[-1].state if done else x, part.start, middle, units)
-        left += [_part(system, first.state, middle, part.end, units), first]
+        second = _part(system, first.state, middle, part.end, units)
+        apart = unresolved or _equal(system, second.factor @ first.factor, part.factor, part.error)
+        apart = apart and part.start < middle < part.end
+        if asked > most or not (apart or kept[-1] > 0.0):
+            raise ContractionError(_TOO_STRONG, field="flow")
+        if apart:
+            left += [second, first]
+        else:
+            done.append(part)
     return done
 
 
@@ -270,26 +285,25 @@ def split_product(factors: Sequence[Array], errors: Sequence[Array] = ()) -> tup
     shape (n,), its unit eigenvectors as columns, and bounds on the change of the logarithms when the entries of the
     factors change by their errors, to first order between groups.
 
-    Each factor must be invertible and of moderate condition; AnalysisError if one has no finite inverse.
+    A ContractionError if a direction that a factor contracts too strongly may vanish in it, by its error.
     """
     n = factors[0].shape[0]
     slow, stretches, slow_motion = _iterate(factors, n)
-    inverses = np.full(1, np.inf)
-    if stretches.all():
-        with contextlib.suppress(np.linalg.LinAlgError):
-            inverses = np.linalg.inv(np.array(factors[::-1]))
-    if not np.isfinite(inverses).all():
+    wrong = [np.linalg.norm(error) for error in errors or np.zeros(len(factors))]
+    norms = np.linalg.norm(factors, axis=(1, 2))
+    least = np.minimum(np.array(wrong) + 4.0 * EPSILON * norms, np.maximum(1.0, norms) / _WORST_CONDITION)
+    if not (stretches > np.tile(least, _AVERAGED)[:, None]).all():
         raise ContractionError(_TOO_STRONG, field="flow")
     growth = np.log(stretches).sum(axis=0) / _AVERAGED
-    fast, _, fast_motion = _iterate(inverses, n)
+    left, _, left_motion = _iterate([factor.T for factor in reversed(factors)], n)
     # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
-    fast = [fast[0], *reversed(fast[1:])]
+    left = [left[0], *reversed(left[1:])]
     # Eigenvalues of one modulus in slanted directions can show a false gap for a while; their spaces do not converge.
-    settled = np.maximum(slow_motion, fast_motion[::-1]) < _AT_REST
+    settled = np.maximum(slow_motion, left_motion) < _AT_REST
     borders = [0, *(1 + np.flatnonzero((growth[:-1] - growth[1:] > _GAP) & settled)).tolist(), n]
-    both = list(zip(slow, fast, strict=True))
+    both = list(zip(slow, left, strict=True))
     groups = [  # bases of the intersections
-        [one[:, :b] @ np.linalg.svd(one[:, :b].T @ other[:, : n - a])[0][:, : b - a] for one, other in both]
+        [one[:, :b] @ np.linalg.svd(one[:, :b].T @ other[:, a:])[0][:, : b - a] for one, other in both]
         for a, b in itertools.pairwise(borders)
     ]
     # A fast direction carried along would be lost in the round-off of the slow ones.
@@ -371,10 +385,11 @@ def split_return(
     AnalysisError, or those of the multipliers that are ``resolved`` without a cut."""
     try:
         values, vectors, moved = _split(system, x, image)
-    except ContractionError:
+    except ContractionError as refused:
         spec = spectrum(image)
         kept = spec.error < _TELLING * np.abs(spec.values)
         if not resolved or not kept.any():
+            refused.allowed = "resolved=True, for those of the larger multipliers" if kept.any() else refused.allowed
             raise
         values, vectors = np.log(spec.values[kept]), spec.right[:, kept]
         moved = SAFETY * (spec.error[kept] / np.abs(spec.values[kept]))
