@@ -196,9 +196,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
         """A point on the curve, in a frame adapted to it, with its tangent along the one ``before``."""
         system = self.system(place.values)
-        section = frame.section
-        if section is not None:
-            section = section_at(system, place.state, frame.size, section.duration)
+        section = frame.section and section_at(system, place.state, frame.size, frame.section.duration)
         place, image = self._mapped(place, section, True)
         if closings(system, place.state, image.duration, frame.size) > 1:  # a later passage of the section
             raise AnalysisError("the motion closes before the period is over", field="step")
@@ -360,8 +358,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def _derivative(self, at: Evaluated) -> Array:
         """Derivative of the equations with respect to the coordinates, exact or by differences."""
-        frame = at.frame
-        m, k = frame.basis.shape[1], at.right.shape[1]
+        frame, m, k = at.frame, at.frame.basis.shape[1], at.right.shape[1]
         columns = []
         for j in range(m + 2):
             step = np.zeros(m + k + 1)
