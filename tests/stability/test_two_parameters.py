@@ -424,3 +424,97 @@ def test_points_of_a_doubled_branch_are_followed_over_two_periods():
     r, q = found.values.T
     assert found.periods == 2
     np.testing.assert_allclose(r / 2.0 - r**2 / 4.0 - r * q, -1.25, atol=1e-12)
+
+
+def bounds_of(curve):
+    return np.array([each.error_bound for each in curve.points])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_nothing_happens_along_collisions(sign):
+    """[[p - q^2, -1], [1, 0]] has determinant 1: both multipliers are +1 or -1 on all of p = q^2 ± 2, in one block. The
+    box is so wide that its rounding in p is far above that of the map."""
+
+    def family2(p, q):
+        matrix = np.array([[p - q * q, -1.0], [1.0, 0.0]])
+        return of_map(lambda x: (matrix @ x, matrix), 2, orbit=np.zeros(2))
+
+    centre, mode = 2.0 * sign, np.array([sign, 1.0], complex) / np.sqrt(2.0)
+    start = BifurcationPoint(Kind.COLLISION, centre + 0.09, 0.0, np.zeros(2), mode, sign + 0j, 0.0)
+    curve = follow2(family2, start, ((centre - 500.0, centre + 500.0), (-3.0, 3.0)), second=0.3)
+    assert not curve.special
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    assert (np.abs(curve.values[:, 0] - curve.values[:, 1] ** 2 - centre) <= bounds_of(curve)[:, 0]).all()
+
+
+def beside(gap, noise=0.0, **more):
+    """x -> -(1 + (p^2 - q^2 - gap) / 3) x: period doublings on the hyperbola p^2 = q^2 + gap, of two curves."""
+
+    def family2(p, q):
+        size = -(1.0 + (p * p - q * q - gap) / 3.0) + noise * np.sin(1e20 * (p + q))
+        return of_map(lambda x: (size * x, np.array([[size]])), orbit=np.zeros(1), many=True)
+
+    start = start_at(np.arccos(np.sqrt(0.25 + gap)))[0]
+    return follow2(family2, start, BOX, second=0.5, points=None, coefficients=False, **more)
+
+
+@pytest.mark.parametrize(("gap", "noise"), [(1e-4, 0.0), (1e-8, 0.0), (-1e-8, 0.0), (1e-6, 2e-16)])
+def test_a_curve_is_not_left_for_a_near_one(gap, noise):
+    curve = beside(gap, noise)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    assert (curve.values[:, 0 if gap > 0.0 else 1] >= np.sqrt(abs(gap)) - 1e-9).all()
+    assert set(np.sign(curve.values[[0, -1], 1 if gap > 0.0 else 0])) == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-16])
+def test_curves_that_cross_are_followed_straight_on(noise):
+    curve = beside(0.0, noise)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    np.testing.assert_allclose(curve.values[:, 0], curve.values[:, 1], atol=1e-9)
+    assert len(curve.points) < 60
+
+
+def test_a_curve_that_cannot_be_told_from_another_one_ends():
+    """Their distance is far below the shortest step, a hundred-thousandth of the longest."""
+    curve = beside(1e-9, longest=1.0, step=1.0)
+    assert Ending.LOST in curve.endings
+    assert len(set(np.sign(curve.values[:, 0]))) == 1
+
+
+def ring(a, k):
+    """z_j -> e^(i / 2) (1 + a - |z_j|^2) z_j + k (z_(j+1) + z_(j-1) - 2 z_j) e^(i / 2) of three alike cells: two pairs
+    are on the unit circle where a = 3 k."""
+    turn, mirror = np.roll(np.eye(3), 1, axis=0), np.eye(3)[::-1]
+    coupled = k * (turn + turn.T - 2.0 * np.eye(3))
+    spin = np.kron([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]], np.eye(3))
+
+    def image(x):
+        u, v = x[:3], x[3:]
+        grow, each = 1.0 + a - u * u - v * v, -2.0 * np.array([[u * u, u * v], [u * v, v * v]])
+        local = np.block([[np.diag(part) for part in row] for row in each])
+        matrix = np.diag(np.tile(grow, 2)) + np.kron(np.eye(2), coupled)
+        return spin @ matrix @ x, spin @ (matrix + local)
+
+    symmetries = [np.kron(np.eye(2), each) for each in (turn, mirror)]
+    return from_map(image, 6, orbit=np.zeros(6), spatial_symmetry=symmetries)
+
+
+def test_two_pairs_that_a_symmetry_makes_equal_are_followed_as_one():
+    (point,) = (each for each in locate(lambda a: ring(a, 0.1), (0.2, 0.4)) if each.multiplicity == 4)
+    curve = follow2(ring, point, ((-0.2, 0.6), (-0.1, 0.3)), second=0.1)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    assert (np.abs(curve.values @ [1.0, -3.0]) <= bounds_of(curve) @ [1.0, 3.0]).all()
+    (special,) = curve.special  # where all cells alike are critical as well
+    assert special.kind is CodimensionTwo.DOUBLE_NEIMARK_SACKER
+    assert (np.abs(special.values) <= special.error_bound).all()
+    assert all(each.coefficient is None for each in curve.points)
+
+
+def test_two_equal_pairs_without_a_symmetry_are_refused():
+    (point,) = (each for each in locate(lambda a: ring(a, 0.1), (0.2, 0.4)) if each.multiplicity == 4)
+
+    def alone(a, k):
+        return replace(ring(a, k), spatial_symmetry=None)
+
+    with pytest.raises(ParameterError, match="has 2 critical pairs that no spatial symmetry makes equal"):
+        follow2(alone, point, ((-0.2, 0.6), (-0.1, 0.3)), second=0.1)

@@ -30,6 +30,7 @@ from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.continuation.equations import Before, Equations, Guess, OutsideBoxError, Plane, Step, inverted
 from chilopod.stability.continuation.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
+from chilopod.stability.continuation.tracer import check_crossing
 from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk
 from chilopod.stability.interface import SystemLike, offers, sizes, system_of
 from chilopod.stability.orbits.orbit import closings, from_known, known_state
@@ -136,6 +137,8 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     first: Spot  # first point of the curve
     shrinks = SHRINKS  # reason for its end where its cycles do
+    copies = 1  # number of equal pairs
+    single: Array | None = None  # projection that leaves one of several
     _motion = 0.0  # largest motion within a period so far
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
@@ -188,9 +191,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
         """A point on the curve, in a frame adapted to it, with its tangent along the one ``before``."""
         system = self.system(place.values)
-        section = frame.section
-        if section is not None:
-            section = section_at(system, place.state, frame.size, section.duration)
+        section = frame.section and section_at(system, place.state, frame.size, frame.section.duration)
         place, image = self._mapped(place, section, True)
         if closings(system, place.state, image.duration, frame.size) > 1:  # a later passage of the section
             raise AnalysisError("the motion closes before the period is over", field="step")
@@ -213,8 +214,9 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return float(np.abs(move).max())
 
     def met(self, anchor: Spot, found: Evaluated, off: float, stalled: int, singular: bool) -> bool:
-        """True if the residual is round-off, or small and no longer falls."""
-        return off <= self.precision or (off <= self.settled and stalled >= _STALLED)
+        """True if the residual is round-off, or small and within its error, or no longer falls."""
+        within = (np.abs(found.residual) <= anchor.uncertainty - np.abs(anchor.residual)).all()
+        return bool(off <= self.precision or (off <= self.settled and (within or stalled >= _STALLED)))
 
     def step(self, anchor: Spot, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Spot, Evaluated]:
         solved = self.corrected(anchor, guess, plane)
@@ -234,6 +236,8 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         ahead /= np.linalg.norm(ahead)
         if not ahead @ start.tangent >= SHARPEST_TURN_UNSEEN:
             raise AnalysisError("the curve turns too sharply", field="step")
+        error = np.nan_to_num([start.shift, end.shift], nan=SETTLED, posinf=SETTLED)
+        check_crossing(self, replace(step, tangent=ahead, end=end), self._derivative, float(error.max()))
         back, tangent = end.frame.between(end.place, start.place), end.frame.carried(start.tangent, frame)
         before = Before(self._onto(end, back), self._onto(end, tangent), None)
         return replace(step, tangent=ahead, end=replace(end, before=before))
@@ -273,8 +277,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def evaluated(self, place: Place, frame: Frame) -> Evaluated:
         """The equations at a place, without error bounds."""
-        place, image = self._mapped(place, frame.section, False)
-        return self._equations(place, image, frame)
+        return self._equations(*self._mapped(place, frame.section, False), frame)
 
     def _mapped(self, place: Place, section: Section | None, with_error: bool) -> tuple[Place, ReturnMap]:
         self.budget.take()
@@ -307,7 +310,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         n, k = size.size, 1 if self.target else 2
         basis = np.zeros((n, 0)) if self.known else symmetric_states(system, place.state, size)
         section = None if image.normal is None else Section(place.state, image.normal, image.duration)
-        jacobian = image.jacobian * size / size[:, None]
+        jacobian = self._scaled(image, size)
         critical = self._critical(jacobian, place.cosine)
         if before is None:
             left, _, right = np.linalg.svd(critical)
@@ -326,6 +329,11 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
             column, row = row * np.sign(overlap), column * np.sign(overlap)
         return Frame(size, self.widths, basis, column, row, mixture, section)
 
+    def _scaled(self, image: ReturnMap, size: Array) -> Array:
+        """The derivative of the return map in units, with one of equal pairs."""
+        jacobian = image.jacobian if self.single is None else image.jacobian @ self.single
+        return jacobian * size / size[:, None]
+
     def _critical(self, jacobian: Array, cosine: float) -> Array:
         one = np.eye(len(jacobian))
         if self.target:
@@ -333,19 +341,17 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return np.asarray(jacobian @ jacobian - 2.0 * cosine * jacobian + one)
 
     def _equations(self, place: Place, image: ReturnMap, frame: Frame) -> Evaluated:
-        jacobian = image.jacobian * frame.size / frame.size[:, None]
+        jacobian = self._scaled(image, frame.size)
         error = np.broadcast_to(image.error, jacobian.shape) * frame.size / frame.size[:, None]
         right, left, inverse = _bordered(self._critical(jacobian, place.cosine), frame.column, frame.row)
         k = right.shape[1]
         orbit = frame.basis.T @ ((image.state - place.state) / frame.size)
         residual = np.concatenate([orbit, frame.mixture @ inverse[-k:, -k:].ravel()])
-        reach = float(np.linalg.norm(inverse, 2))
-        return Evaluated(place, image, frame, jacobian, error, residual, right, left, reach)
+        return Evaluated(place, image, frame, jacobian, error, residual, right, left, float(np.linalg.norm(inverse, 2)))
 
     def _derivative(self, at: Evaluated) -> Array:
         """Derivative of the equations with respect to the coordinates, exact or by differences."""
-        frame = at.frame
-        m, k = frame.basis.shape[1], at.right.shape[1]
+        frame, m, k = at.frame, at.frame.basis.shape[1], at.right.shape[1]
         columns = []
         for j in range(m + 2):
             step = np.zeros(m + k + 1)
@@ -358,8 +364,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         return matrix
 
     def _uncertainty(self, at: Evaluated) -> Array:
-        frame, error = at.frame, at.error
-        wrong, power = error, 1
+        frame, error, wrong, power = at.frame, at.error, at.error, 1
         if not self.target:
             own = np.abs(at.jacobian)
             wrong, power = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error, 2

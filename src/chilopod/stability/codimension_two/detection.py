@@ -83,10 +83,10 @@ class Critical:
         else:
             cosine = at.place.cosine
             self.multiplier = nu = complex(cosine + 1j * np.sqrt(complex(1.0 - cosine * cosine)))
-            first = self.spectrum.nearest(nu)
+            upper = np.abs(values - nu).argsort()[: curve.copies]
             distance = np.abs(values - 1.0 / nu)
-            distance[first] = np.inf
-            own = [first, int(distance.argmin())]
+            distance[upper] = np.inf
+            first, own = upper[0], [*upper, *distance.argsort()[: curve.copies]]
             mode, left = self.spectrum.right[:, first], self.spectrum.left[:, first]
             turn = np.abs(mode).max() / mode[np.abs(mode).argmax()]
             mode, left = mode * turn, left * turn
@@ -168,7 +168,9 @@ class Detector:
             return value * here.overlap, error * abs(here.overlap)
         if isinstance(signal, CodimensionTwo):
             if self.curve.target:
-                return here.overlap, 2.0 * at.reach * float(np.linalg.norm(at.error))
+                # The error of the multiplier is as that of an entry, and moves the overlap of a double one as much.
+                wrong = float(np.linalg.norm(at.error)) + abs(float(at.residual[-1]))
+                return here.overlap, 2.0 * at.reach * wrong
             return at.place.cosine - _COSINES[signal], float(at.shift[-1]) if isinstance(at, Spot) else 0.0
         nu, errors = here.spectrum.values[here.others], here.spectrum.error[here.others]
         if signal is CircleEvent.PAIR:
@@ -179,9 +181,9 @@ class Detector:
 
     def _decisive(self, here: Critical) -> tuple[float, float]:
         """The decisive coefficient on a curve of this kind, and its error; NaN if undefined."""
-        # Past the end of a pair's curve are two real multipliers with product 1.
-        past = abs(here.at.place.cosine) >= 1.0
-        if past or here.form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
+        # Past the end of a pair's curve are two real multipliers with product 1; equal pairs have no single form.
+        none = abs(here.at.place.cosine) >= 1.0 or self.curve.copies > 1
+        if none or here.form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
             return np.nan, np.nan
         if self._kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
             return here.form.quadratic, here.form.quadratic_error

@@ -26,8 +26,10 @@ from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Po
 from chilopod.stability.codimension_two.detection import Critical, Detector, Station, across
 from chilopod.stability.continuation.equations import Step
 from chilopod.stability.continuation.tracer import Ending, trace
+from chilopod.stability.crossing_place import orbit_blocks
 from chilopod.stability.equilibria import SHRINKS
 from chilopod.stability.interface import SystemLike, offers, sizes, system_of, with_shared_symmetries
+from chilopod.stability.orbits.orbit import find_orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import event_beside, return_duration, returned_states, section_at, whole_period
 from chilopod.stability.symmetry.groups import reverses
@@ -107,6 +109,8 @@ def follow2(
         curve.shrinks = f"{SHRINKS}: a Bautin point (generalised Hopf)"
     nu = complex(start.multiplier)
     with curve.budget:
+        if target == 0 and start.multiplicity > 2:
+            _keep_one(curve, curve.system(values), start)
         first = curve.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)), start.period)
         if outward is None and (np.abs(first.place.values - values) > _MOVED * np.ptp(box, axis=1)).any():
             said = f"is not that of the start: the nearest point of a curve is at {in_one_line(first.place.values)}"
@@ -165,6 +169,21 @@ def _target(family2: Family2, start: BifurcationPoint, second: float) -> tuple[i
     return target, known
 
 
+def _keep_one(curve: CriticalCurve, system: SystemLike, start: BifurcationPoint) -> None:
+    """Reduce the equations to one of several pairs, which a symmetry of the orbit makes equal: the first coordinate of
+    its representation in every copy."""
+    for block in orbit_blocks(system, find_orbit(system, None if curve.known else start.orbit, settle=False))[0]:
+        if block is None or 2 * block.repeats != start.multiplicity:
+            continue
+        if np.allclose(block.basis @ (block.dual @ start.mode), start.mode):
+            rest = np.arange(block.basis.shape[1]) % block.dimension > 0
+            curve.copies = block.repeats
+            curve.single = np.eye(start.mode.size) - block.basis[:, rest] @ block.dual[rest]
+            return
+    said = f"has {start.multiplicity // 2} critical pairs that no spatial symmetry makes equal"
+    raise ParameterError(said, field="start", allowed="a point with a single pair, or spatial_symmetry")
+
+
 _Looked = tuple[Station | None, list[SpecialPoint2]]  # the station at the end of a step, if any, and its events
 
 
@@ -209,7 +228,7 @@ def _followed(
     return kept, ending, reason
 
 
-_TIP = "the equations are singular here, as at the tip of an Arnold tongue, where periodic orbits form a continuum"
+_TIP = "the equations are singular here, as beside another curve, or in a continuum at the tip of an Arnold tongue"
 _BESIDE = 1e-3  # step of differences of the cubic coefficient, in units of the box and of the states
 _FARTHEST = 0.1  # largest distance of a fold along the curve, in the same units
 _HALVINGS = 12  # halvings of the amplitude

@@ -29,6 +29,7 @@ SHARPEST_TURN = 0.5
 SHARPEST_TURN_UNSEEN = 0.9
 SURPRISE = 0.3  # distance of a step's end from the prediction, relative to the step, above which its middle is checked
 AWAY = 0.1  # largest distance of the curve from the cubic through a step's ends, relative to the step
+HIDDEN = 10.0  # length around a crossing that errors hide, relative to the root of theirs and the step's
 
 # Closed curves.
 NEAR = 0.05  # distance of the cubic from the start, relative to the step, below which the corrector is tried there

@@ -118,6 +118,31 @@ class Parts(Generic[A, S, R]):
         return self._known[place]
 
 
+def check_crossing(
+    equations: Equations[A, S, R], step: Step[A, S], derivative: Callable[[R], Array], error: float
+) -> None:
+    """Check that a step over which the sign of the determinant changes crosses another curve, where the curve goes
+    straight on, and has not jumped to one nearby. Beside a crossing the equations are nearly singular, and an ``error``
+    of the points hides the way of the curve over a length that is its root."""
+    start, ahead, low, high = step.start, step.start.tangent, 0.0, step.size
+    before, after = (np.linalg.slogdet(each.matrix)[0] for each in (start, step.end))
+    hidden = tolerances.HIDDEN * float(np.sqrt(error * step.size))
+
+    def guess(place: float) -> Guess:
+        moved, (parameters, widths) = step.between(place).moved, equations.parameters(start)
+        values = np.clip(start.values + widths * moved[parameters], *equations.box.T)
+        return Guess(moved, np.vstack([derivative(equations.residual(start, moved, values)[0]), ahead]))
+
+    while before != after and high - low > hidden:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if np.linalg.slogdet(guess(middle).matrix)[0] == before else (low, middle)
+    if before != after:
+        places = max(low - hidden, 0.0), min(high + hidden, step.size)
+        first, last = (equations.step(start, guess(place), Plane(ahead, place)).moved for place in places)
+        if not ahead @ (last - first) >= tolerances.STRAIGHT * float(np.linalg.norm(last - first)):
+            raise AnalysisError("another one is too near to be told apart", field="curve")
+
+
 def _taken(equations: Equations[A, S, R], anchor: A, size: float) -> tuple[Step[A, S], Ending | None]:
     """A step of a size, or a shorter one to an edge of the box or to the start of the curve."""
     guess, ahead = predicted(anchor, size), Plane(anchor.tangent, size)
