@@ -1,5 +1,7 @@
 """How branches end, and what is refused: no family, however hostile, ends in anything but an ending or one line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 

@@ -23,7 +23,7 @@ from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import Deadline, SpentError
 from chilopod.frozen import Array, ComplexArray
-from chilopod.stability.crossing_place import Course, Sample, place_error
+from chilopod.stability.crossing_place import Course, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.interface import Autonomous, Family, SystemLike, offers
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
