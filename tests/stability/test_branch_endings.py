@@ -1,5 +1,7 @@
 """How branches end, and what is refused: no family, however hostile, ends in anything but an ending or one line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -386,3 +388,22 @@ def test_a_family_by_energy_has_no_branch_points_of_its_own(width):
     assert branch.special_points == ()
     assert str(branch).startswith(f"Branch by energy: {len(branch.points)} orbits with periods between 3.0")
     assert branch.plot().get_xlabel() == "period"
+
+
+def test_branches_that_do_not_go_on_are_refused():
+    """Fixed points with p^2 + (x - 3)^2 = 1: a closed branch."""
+
+    def circle(p):
+        return from_map(lambda x: ([x[0] + 0.3 * (1.0 - p * p - (x[0] - 3.0) ** 2)], [[1.0 - 0.6 * (x[0] - 3.0)]]), 1)
+
+    start = begin(circle, 0.1, [3.0 + np.sqrt(0.99)])
+    closed = follow(circle, start, (-2.0, 2.0))
+    assert closed.ending is Ending.CLOSED
+    with pytest.raises(ParameterError, match="is a closed branch"):
+        follow(circle, closed, (-2.0, 2.0))
+    with pytest.raises(ParameterError, match="is a branch without points"):
+        follow(circle, replace(closed, points=()), (-2.0, 2.0))
+    part = follow(circle, start, (-2.0, 2.0), points=3)
+    plane = lambda p: from_map(lambda x: (0.5 * x, 0.5 * np.eye(2)), 2)  # noqa: E731
+    with pytest.raises(ParameterError, match="must have the branch's dimension"):
+        follow(plane, part, (-2.0, 2.0))

@@ -738,3 +738,32 @@ def test_a_small_cycle_surrounds_an_equilibrium_that_oscillates_with_its_period(
     for drive in (1e-4, -1e-4):
         neuron = from_rhs(lambda t, x, drive=drive: [x[0] ** 2 + drive], 1, None, guess_period=300.0, events=[fire])
         assert not has_centre(neuron, np.array([0.0]), 300.0)
+
+
+def fast_voltage(share):
+    """FitzHugh and Nagumo's equations, whose voltage v is 1 / share times as fast: Hopf points at v^2 = 1 - 0.8 share.
+    Between them one eigenvalue grows to 1 / share."""
+
+    def family(current):
+        def rhs(t, x):
+            return [(x[0] - x[0] ** 3 / 3.0 - x[1] + current) / share, x[0] + 0.7 - 0.8 * x[1]]
+
+        return from_rhs(rhs, 2, None, guess_period=3.0)
+
+    v = np.sqrt(1.0 - 0.8 * share) * np.array([-1.0, 1.0])
+    return family, (v + 0.7) / 0.8 - v + v**3 / 3.0
+
+
+def test_hopf_points_between_which_growth_is_fast():
+    family, values = fast_voltage(1e-5)
+    found = locate_hopf(family, (0.25, 2.0), [-1.05, -0.45])
+    assert found.complete
+    assert [point.value for point in found] == pytest.approx(values, abs=1e-12)
+    assert [point.frequency for point in found] == pytest.approx(2 * [np.sqrt(1e5 - 0.64)], rel=1e-9)
+
+
+def test_a_hopf_point_where_rounding_of_the_state_is_as_large_as_the_last_digits_of_the_parameter():
+    family, values = fast_voltage(1e-7)
+    found = locate_hopf(family, (0.0, 0.29225814239355585), [-1.2, -0.6])
+    assert found.complete
+    assert [point.value for point in found] == pytest.approx(values[:1], abs=1e-12)

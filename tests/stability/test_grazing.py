@@ -1,11 +1,13 @@
 """Orbits that graze an event: with it and without it they may be two curves, which no search takes for one."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from chilopod.stability import Ending, Event, Kind, begin, follow, from_rhs, locate
+from chilopod.stability.returns import JUMPS_AHEAD, event_beside
 
 HIGHEST = 2.000103979842264
 """Largest angle of the van der Pol oscillator with a damping of 0.1, by scipy's DOP853."""
@@ -103,4 +105,16 @@ def test_passages_of_events_are_counted_that_depend_on_states():
     start = np.array([0.0, 1.0])
     assert list(forced(0.5, events=[timed, passes]).flow_events(start, 0.0, 2.0 * np.pi)) == [2.0]
     assert list(forced(0.0, events=[passes]).flow_events(start, 0.0, 2.0 * np.pi)) == [1.0]
-    assert forced(0.5).flow_events is None
+    assert list(forced(0.5).flow_events(start, 0.0, 2.0 * np.pi)) == []
+
+
+def test_a_system_without_events_is_told_of_none():
+    """A return jumps beside an orbit, as one that grows by e^T just ahead; the right-hand sides are linear."""
+
+    def ahead(distance):
+        return from_rhs(lambda t, x, p: [p * x[0]], 1, 1.0, args=(float(distance > 1e-12),)), np.ones(1)
+
+    system, x = ahead(0.0)
+    assert event_beside(system, x, 1.0, ahead) == ""
+    counted = lambda distance: (replace(ahead(distance)[0], flow_events=None), x)  # noqa: E731
+    assert event_beside(replace(system, flow_events=None), x, 1.0, counted) == JUMPS_AHEAD

@@ -213,7 +213,7 @@ class RightHandSide:
             fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
             return ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance)
 
-        members: Members = {"concurrent": True}
+        members: Members = {"concurrent": True, "flow_events": lambda x, t0, t1: np.empty(0)}
         if self.method == "implicit":
             members |= {name: getattr(implicit(), name) for name in (*_FLOWS, "flow_volume")}
             members["is_stiff"] = lambda x, t0, t1: True
@@ -225,7 +225,7 @@ class RightHandSide:
                 "flow_states": lambda states, t0, t1: taylor.states(states, t0, t1, params),
                 "flow_tangents": lambda x, along, t0, t1: taylor.tangents(x, along, t0, t1, params),
             }
-            if tape.switches.size:
+            if not can_be_implicit(tape):
                 members["flow_events"] = lambda x, t0, t1: taylor.events(x, t0, t1, params)
             if taylor.patience:
                 members = members | _either(members, implicit)

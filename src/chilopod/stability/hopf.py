@@ -18,12 +18,12 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.carrying import numerical_balance
 from chilopod.flows.deadline import Deadline, SpentError
-from chilopod.frozen import Array
-from chilopod.stability.crossing_place import Course, Sample, place_error
+from chilopod.frozen import Array, ComplexArray
+from chilopod.stability.crossing_place import Course, place_error
 from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.interface import Autonomous, Family, SystemLike, offers
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
@@ -33,10 +33,11 @@ from chilopod.stability.shown import bounded
 from chilopod.stability.spectrum import EPSILON
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.system import PeriodicSystem
-from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings
+from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, SearchStatus, find_crossings, first_values
 from chilopod.stability.unit_circle.spectra import CircleEvent, Crossing
 
 _LARGEST = 1e150  # growth within a guessed period: its square is a number still
+_FASTEST = np.pi  # largest exponent of a growth or an oscillation in a step: half a turn
 _REACH = 10.0  # largest exponent of the slowest decay in a step, as it may become a growth elsewhere
 _POINTS = 2000  # budget of return maps beside a point: those of the map cost almost nothing
 _BESIDE = 1e-5  # step of central differences for the rate of an eigenvalue, relative to the interval
@@ -89,19 +90,19 @@ def locate_hopf(
     while at < high and not (pieces and (left < _LEAST or limit.late)):
         end = min(high, _WIDE * at) if at > 0.0 else high
         try:
-            found, reached = _piece(family, (at, end), state, left, limit)
+            found, samples = _piece(family, (at, end), state, left, limit)
             while found.ending and found.status is SearchStatus.INCOMPLETE and end - at > _NARROWEST * (high - low):
                 left, end = left - found.evaluations, at + _SHORTER * (end - at)
-                found, reached = _piece(family, (at, end), state, max(left, _LEAST), limit)
+                found, samples = _piece(family, (at, end), state, max(left, _LEAST), limit)
         except SpentError:
             if not pieces:
                 raise
             break
-        left, last = left - found.evaluations, reached
+        left, last = left - found.evaluations, samples.path[-1]
         pieces.append(found)
-        if last.value < end:  # a fold, or the search cannot go on
+        if last.value < samples.high:  # a fold, or the search cannot go on
             break
-        at, state = end, last.orbit
+        at, state = last.value, last.orbit
     found = joined(pieces)
     status, remarks = found.status, list(found.remarks)
     if last.value == at < high and not pieces[-1].ending:
@@ -117,12 +118,14 @@ def locate_hopf(
 
 def _piece(
     family: Family, between: tuple[float, float], equilibrium: ArrayLike, budget: int, limit: Deadline
-) -> tuple[Located, Sample]:
-    """Hopf points in an interval that is not so wide that rates change by decades, and the last equilibrium."""
-    low, high = between
+) -> tuple[Located, Samples]:
+    """Hopf points in the part of an interval in which rates do not outgrow those at its start, and its equilibria."""
+    low = between[0]
     with Deadline(limit.remaining):
         system, start = equilibrium_at(family, low, equilibrium)
-    duration, scale = _duration(start, system.guess_period), _scale(system, start)
+        duration = _duration(start, system.guess_period)
+        high = _suited(family, between, start, duration)
+    scale = _scale(system, start)
     samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, limit.remaining)
 
     def matrices(values: Array) -> tuple[Array, Array]:
@@ -148,13 +151,15 @@ def _piece(
                 return [_of_f(family, between, point, duration)]
             except AnalysisError as error:
                 reason = error.problem
+        if not point.error_bound < samples.width:
+            raise AnalysisError(f"its error bound of {point.error_bound:.1e} is too large", field="value")
         return [f"no coefficient at {point.value:.9g}: {reason}", replace(point, multiplier=1j * point.frequency)]
 
     def ended(fold: BifurcationPoint) -> str:
         where = bounded(fold.value, fold.error_bound)
         return f"the equilibrium ends in a fold at {where}: it meets another one there"
 
-    return located(samples, crossings, described, ended, _POINTS), samples.path[-1]
+    return located(samples, crossings, described, ended, _POINTS), samples
 
 
 def _check_zero(family: Family, between: tuple[float, float], crossing: Crossing, samples: Samples) -> None:
@@ -203,20 +208,46 @@ def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
     most = float((size / units).max())
     reach, steepest = float(np.linalg.norm(rounding)), max(float(values[0]), 1e-300)
     # Where it is singular, terms of second or third order fix the state.
-    off = min(reach / max(float(values[-1]), 1e-300), most * float(np.cbrt(reach / (steepest * most))))
-    beside = linear_part(system, x + off * units * rows[-1])[1]
-    moved = float(np.linalg.norm((np.abs(beside - matrix) + wrong) * ratios))
+    off = np.minimum(reach / np.maximum(values, 1e-300), most * np.cbrt(reach / (steepest * most)))
+    # Of two directions that are alike the derivative may change along one alone: two sums of all differ in these.
+    beside = [linear_part(system, x + units * (signs * off @ rows))[1] for signs in (1.0, (-1.0) ** np.arange(x.size))]
+    moved = float(np.linalg.norm((sum(np.abs(each - matrix) for each in beside) + wrong) * ratios))
     return 4.0 * EPSILON * (1.0 + duration * float(np.linalg.norm(matrix * ratios))) + duration * moved
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
     """The step h of the map: a radian of the fastest oscillation or growth, or about the time of the decays."""
     values = start.eigenvalues
-    fastest = float(np.maximum(np.abs(values.imag), values.real).max())
+    fastest = _fastest(values)
     if fastest > 0.0:
         return 1.0 / max(fastest, float(np.abs(values.real).min()) / _REACH)
     sizes = np.abs(values[values != 0.0])
     return float(np.exp(-np.log(sizes).mean())) if sizes.size else guess_period / (2.0 * np.pi)
+
+
+def _suited(family: Family, between: tuple[float, float], start: Equilibrium, duration: float) -> float:
+    """An end of an interval, as high as it may be, up to which the step suits the rates of an equilibrium."""
+    low, end = between
+    while True:
+        reached, state = low, start.state
+        try:
+            for value in first_values(low, end)[1:].tolist():
+                here = equilibrium_at(family, value, state)[1]
+                if duration * _fastest(here.eigenvalues) > _FASTEST:
+                    break
+                reached, state = value, here.state
+            else:
+                return end
+        except ChilopodError:  # the search finds out
+            return end
+        if reached > low or end - low <= _NARROWEST * (between[1] - low):
+            return reached if reached > low else end
+        end = low + _SHORTER * (end - low)
+
+
+def _fastest(values: ComplexArray) -> float:
+    """Rate of the fastest oscillation or growth."""
+    return float(np.maximum(np.abs(values.imag), values.real).max())
 
 
 def _scale(system: Autonomous, start: Equilibrium) -> Array | None:
@@ -257,7 +288,12 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
         return x + units * power[:n, n], power[:n, :n] * ratios, error * ratios
 
     return PeriodicSystem(
-        n, duration, lambda x, t0, t1: flow_with_error(x, t0, t1)[:2], scale=scale, flow_with_error=flow_with_error
+        n,
+        duration,
+        lambda x, t0, t1: flow_with_error(x, t0, t1)[:2],
+        scale=scale,
+        flow_with_error=flow_with_error,
+        flow_events=lambda x, t0, t1: np.empty(0),
     )
 
 

@@ -116,7 +116,8 @@ class Capabilities(Autonomous, Protocol):
         these coefficients, of the same shape; else differences are used."""
 
     def flow_events(self, x: Array, t0: float, t1: float, /) -> Array:
-        """Numbers of passages of all events and switches from state x at t0 to t1; else no grazing is noticed."""
+        """Numbers of passages of all events and switches from state x at t0 to t1, none for a system
+        without any; else no grazing is noticed."""
 
 
 def offers(system: object, member: str) -> TypeGuard[Capabilities]:

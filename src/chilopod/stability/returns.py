@@ -59,6 +59,8 @@ MOVED = "at {:.9g} time 0 was moved along the orbit, away from an event"
 EVENT_AT_ZERO = "an event passes time 0 of the orbit: let the right-hand side begin at another time"
 GRAZES = "just ahead the orbit grazes an event, which begins or ceases to happen: returns are not smooth there"
 
+JUMPS_AHEAD = "just ahead returns change so fast that they seem to jump, as where an orbit grazes an event"
+
 CUTS = (0.0, 0.0477, 0.382)
 """Fractions of an interval at which it is cut: one near the start, as steps up to the first cut repeat with their
 errors."""
@@ -317,7 +319,7 @@ def jumps_at_ends(system: SystemLike, x: Array, duration: float, part: float = _
             most = max(before, after)
         return most
 
-    if any(change(at(x, 0.0, each), each, each + part) == 0.0 for each in _PARTS):
+    if not has_events(system, x, duration) or any(change(at(x, 0.0, p), p, p + part) == 0.0 for p in _PARTS):
         return False  # a map has no parts, but over several periods is applied within them too
     # Round-off decides whether a state at a jump is before it or after it.
     end = 1.0 + _JUST_PAST * part * is_autonomous(system)
@@ -334,9 +336,14 @@ def starts(system: SystemLike, x: Array, duration: float) -> Iterator[Array]:
 
 
 def events_in(system: SystemLike, x: Array, period: float) -> tuple[float, ...]:
-    """Numbers of passages of the events in a period from a state; none if the system does not count them."""
+    """Numbers of passages of the events in a period from a state; none if the system has none, or does not count."""
     with UserCode("flow_events"):
         return tuple(system.flow_events(x.copy(), 0.0, period)) if offers(system, "flow_events") else ()
+
+
+def has_events(system: SystemLike, x: Array, period: float) -> bool:
+    """False if a system counts its events, and there are none to count: fast motions may look like jumps."""
+    return not offers(system, "flow_events") or bool(events_in(system, x, period))
 
 
 def event_beside(system: SystemLike, x: Array, time: float, ahead: Callable[[float], tuple[SystemLike, Array]]) -> str:
@@ -352,8 +359,8 @@ def event_beside(system: SystemLike, x: Array, time: float, ahead: Callable[[flo
         if jumps_at_ends(system, x, time):
             return EVENT_AT_ZERO
         # A very unstable orbit meets other events on both sides.
-        if jumps_within(seen, 0.0, _PAST) and not jumps_within(seen, 0.0, -_PAST):
-            return GRAZES
+        if has_events(system, x, time) and jumps_within(seen, 0.0, _PAST) and not jumps_within(seen, 0.0, -_PAST):
+            return GRAZES if seen(0.0)[0] != seen(_PAST)[0] else JUMPS_AHEAD
     return ""
 
 

@@ -186,8 +186,8 @@ def follow(
 ) -> Branch:
     """Follow a branch from a point along its tangent, or from its end; an AnalysisError if no orbit is found there.
 
-    The points of a continued branch equal those of a single run; for a system without a period of its own they are
-    other points of the same curve, as the last section is rebuilt.
+    The points of a continued branch equal those of a single run to round-off; for a system without a period of its own
+    they are other points of the same curve, as the last section is rebuilt. A closed branch cannot be continued.
 
     Parameters
     ----------
@@ -259,7 +259,12 @@ def _in_units(point: BranchPoint, units: Array) -> BranchPoint:
 
 def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anchor]:
     """A branch to be continued with a longest step, and the anchor at its end; the curve gets its units."""
+    if not branch.points or branch.ending is Ending.CLOSED:
+        what = "is a closed branch, which does not go on" if branch.points else "is a branch without points"
+        raise ParameterError(what, field="start", allowed="a start, an orbit, or a branch with an end")
     end, first, (low, high) = branch.points[-1], branch.points[0], curve.between
+    if (n := curve.system(end.value).dimension) != end.orbit.size:
+        raise ParameterError("must have the branch's dimension", field="family", value=n, allowed=f"{end.orbit.size}")
     if not low <= end.value <= high or outward(curve.box, np.array([end.value]), end.tangent[-1:]):
         said = "must extend beyond the branch's last point"
         raise ParameterError(said, field="between", value=curve.between, allowed=f"an interval around {end.value!r}")
