@@ -40,7 +40,7 @@ KNOWN = {
     "13_bouncing_ball": [r"period doubling at (\S+) mm, in closed form \1 mm"],
     "15_twin": ["arrived"],
     "16_two_parameters": [r"degenerate pitchfork at 11\.88384 N.mm/deg and 47\.8332 mm"],
-    "17_a_cycle_beside_chaos": [r"fold  5\.6431157912", r"period doubling  4\.9449592164 .* supercritical"],
+    "17_a_cycle_beside_chaos": [r"fold  5\.6431157912", r"period doubling  4\.9449592164\d* .* supercritical"],
 }
 
 

@@ -84,6 +84,10 @@ def unsealed(path: Path) -> bytes:
     with sealed_file(path) as file:
         content = file.read()
     data = content[:-_LENGTH]
-    if sealed(data) != content:
+    if not _is_whole(data, content):
         raise UnsoundError("is damaged or was edited, or chilopod did not write it")
     return data
+
+
+def _is_whole(data: bytes, content: bytes) -> bool:
+    return sealed(data) == content

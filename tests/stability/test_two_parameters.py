@@ -120,8 +120,9 @@ def test_where_the_map_does_not_exist_the_curve_is_lost_with_a_reason():
 
 
 @pytest.mark.parametrize(("rising", "border"), [(True, 0.3), (False, -0.3)])
-def test_a_grazing_that_ends_the_curve_is_named(rising, border):
-    """Beyond the border the derivative of the return has another value, as where an impact is added."""
+def test_a_jump_that_ends_the_curve_is_named(rising, border):
+    """Beyond the border the derivative of the return has another value, as where an impact is added that is not
+    counted."""
 
     def family2(p, q):
         def image(x):
@@ -134,7 +135,7 @@ def test_a_grazing_that_ends_the_curve_is_named(rising, border):
     (fold,) = follow(family, begin(family, 0.04, [0.2], rising=False), (-0.1, 0.05)).special_points
     curve = follow2(family2, fold.bifurcation, BOX, second=0.0, rising=rising)
     assert curve.endings[1] is Ending.LOST
-    assert curve.reasons[1].startswith("just ahead the orbit grazes an event")
+    assert curve.reasons[1].startswith("just ahead returns change so fast that they seem to jump")
     assert curve.remarks == (curve.reasons[1],)
     assert curve.to_dataset().attrs["remarks"] == curve.reasons[1]
     assert curve.values[-1] == pytest.approx([0.0, border], abs=1e-5)

@@ -270,14 +270,17 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
         except AnalysisError as second:
             raise (first if ZERO_BY_ZERO in first.problem else second) from None
 
-    def flow(name: str, x: Array, t0: float, t1: float) -> Any:
-        nonlocal latest
-        try:
-            found = taylor[name](x, t0, t1)
-        except TooManySteps as first:
-            return instead(first, name, x, t0, t1)
-        latest = x.tobytes(), t0, t1
-        return found
+    def either(name: str) -> Callable[..., Any]:
+        def flow(x: Array, t0: float, t1: float) -> Any:  # of this module: its derivative needs no comparison
+            nonlocal latest
+            try:
+                found = taylor[name](x, t0, t1)
+            except TooManySteps as first:
+                return instead(first, name, x, t0, t1)
+            latest = x.tobytes(), t0, t1
+            return found
+
+        return flow
 
     def is_stiff(x: Array, t0: float, t1: float) -> bool:
         if latest != (x.tobytes(), t0, t1):
@@ -295,7 +298,7 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
             images = derivative @ along
         return state, images
 
-    return {name: functools.partial(flow, name) for name in _FLOWS} | {
+    return {name: either(name) for name in _FLOWS} | {
         "flow_tangents": flow_tangents,
         "flow_volume": lambda *args: implicit().flow_volume(*args),
         "is_stiff": is_stiff,

@@ -232,7 +232,8 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     size = _coupled(size, derivative)
     if size[size > 0.0].min() < _TINY * size.max() and offers(system, "flow_with_error"):
         # Of a state that rests at zero the flow may compute nothing but rounding.
-        later, derivative, error = checked_flow(system, x, 0.0, _PART * duration, with_error=True)
+        with UserCode("flow_with_error"):
+            later, derivative, error = system.flow_with_error(x.copy(), 0.0, _PART * duration)
         error = _ERRORS * np.broadcast_to(error, derivative.shape)
         later = np.where(np.abs(later) > error @ np.abs(x), np.abs(later), 0.0)
         size = _coupled(np.maximum(np.abs(x), later), np.where(np.abs(derivative) > error, derivative, 0.0))
