@@ -407,3 +407,18 @@ def test_branches_that_do_not_go_on_are_refused():
     plane = lambda p: from_map(lambda x: (0.5 * x, 0.5 * np.eye(2)), 2)  # noqa: E731
     with pytest.raises(ParameterError, match="must have the branch's dimension"):
         follow(plane, part, (-2.0, 2.0))
+
+
+def test_a_resumed_branch_is_not_studied_outside_its_interval():
+    def family(p):
+        assert p < 0.5
+        return from_map(lambda x: ([0.5 * x[0] + p], [[0.5]]), 1)
+
+    part = follow(family, begin(family, 0.0, [0.0]), (-0.1, 0.4), points=3)
+
+    def narrow(p):
+        assert p <= 0.01
+        return family(p)
+
+    with pytest.raises(ParameterError, match="must extend beyond the branch's last point"):
+        follow(narrow, part, (-0.1, 0.01))

@@ -263,13 +263,14 @@ def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anc
         what = "is a closed branch, which does not go on" if branch.points else "is a branch without points"
         raise ParameterError(what, field="start", allowed="a start, an orbit, or a branch with an end")
     end, first, (low, high) = branch.points[-1], branch.points[0], curve.between
-    if (n := curve.system(end.value).dimension) != end.orbit.size:
-        raise ParameterError("must have the branch's dimension", field="family", value=n, allowed=f"{end.orbit.size}")
     if not low <= end.value <= high or outward(curve.box, np.array([end.value]), end.tangent[-1:]):
         said = "must extend beyond the branch's last point"
         raise ParameterError(said, field="between", value=curve.between, allowed=f"an interval around {end.value!r}")
     curve.scale, curve.sizes = branch.scale, branch.units[:-1]
     curve.periods, curve.symmetric = branch.periods, branch.symmetric
+    n, allowed = curve.system(end.value).dimension, f"{end.orbit.size}"
+    if n != end.orbit.size:
+        raise ParameterError("must have the branch's dimension", field="family", value=n, allowed=allowed)
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = 0.0 if last.special is None else branch.step
