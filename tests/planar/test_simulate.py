@@ -7,8 +7,9 @@ import pytest
 from chilopod import load_robot
 from chilopod.engine import Command, Event, Status
 from chilopod.errors import ParameterError
-from chilopod.planar import PlanarModel, initial_states, simulate
+from chilopod.planar import PlanarModel, initial_states, simulate, start
 from chilopod.planar.energy import module_motion
+from chilopod.record import Recording
 from helpers.walks import reduced
 
 PRESET = load_robot("aoi2022-planar")
@@ -61,6 +62,33 @@ def test_the_default_step_is_good_to_a_micrometre_over_a_minute(seed):
     # Sampling makes steps end at the samples, and changes nothing else.
     often = simulate(robots, 60.0, initial=start, rate=100.0).isel(time=slice(None, None, 100))
     assert float(np.abs(usual.position - often.position.values).max()) < 1e-6
+
+
+@pytest.mark.parametrize(("when", "within"), [(0.05, 0.4), (0.4, 0.5)])
+def test_recorded_yaw_is_that_of_the_feet_that_stand(when, within):
+    """Force on a foot at rest on its yawed line, by hand: of a leg that stands at the command, and one that swings."""
+    walk = start(SOFT, record=Recording(rate=100.0, forces=True))
+    walk.advance(when)
+    walk.command(Command(leg_yaw=[[0.3, 0.3]], within=within))
+    walk.advance(0.75)
+    record, gait, legs = walk.to_dataset().isel(robot=0), SOFT.gait, SOFT.legs
+    stands = gait.stands(gait.phases(record.time.values, 1)[:, 0])
+    after = (record.time.values > when + 1e-9)[:, None] & stands
+    assert (record.leg_yaw.values[after] == 0.3).all()
+    for i, side in np.argwhere(stands):
+        heading, turn = float(record.heading[i]), float(record.heading_rate[i])
+        yaw, stroke = record.leg_yaw.values[i, side], gait.stroke(gait.phases(record.time.values[i], 1)[0, side])
+        along = np.array([np.cos(yaw), np.sin(yaw)])
+        c, s = np.cos(heading), np.sin(heading)
+        ahead, left = np.array([c, s]), np.array([-s, c])
+        foot = np.array([legs.forward_offset, (1, -1)[side] * legs.half_width]) + stroke * along
+        x, y = foot[0] * ahead + foot[1] * left
+        back = gait.speed * (along[0] * ahead + along[1] * left)
+        slip = record.velocity.values[i] + turn * np.array([-y, x]) - back
+        np.testing.assert_allclose(record.foot_force.values[i, 0, side], -SOFT.ground.friction * slip, atol=1e-9)
+    swings = (record.time.values > when)[:, None] & ~stands
+    assert (record.leg_yaw.values[swings] >= 0.0).all()
+    assert (np.diff(record.leg_yaw.values, axis=0) >= 0.0).all()
 
 
 def test_forces_of_yawed_feet_move_the_robot_as_newton_and_euler_say():

@@ -56,11 +56,12 @@ class Ramps:
         """Setpoint of the last command."""
         return self._ramps[1]
 
-    def to(self, goal: Array, now: float, within: float) -> None:
+    def to(self, goal: Array, now: float, within: ArrayLike) -> None:
         """Move to ``goal`` (NaN: unchanged), from a time on and within a duration, both in any unit."""
-        changed = ~np.isnan(goal) & ((goal != self.goal) | (now + within < self._ramps[3]))
+        until = np.add(now, within)
+        changed = ~np.isnan(goal) & ((goal != self.goal) | (until < self._ramps[3]))
         if changed.any():
-            begun = np.broadcast_arrays(_at(self._ramps, now), goal, now, now + within)
+            begun = np.broadcast_arrays(_at(self._ramps, now), goal, now, until)
             self._ramps = np.where(changed, begun, self._ramps)
             if self._history is not None:
                 self._history.append((now, self._ramps))
@@ -143,9 +144,10 @@ class Actuators:
         """True if any spring of any robot is adjustable."""
         return bool(self._adjustable.any())
 
-    def command(self, time: float, command: Command, walking: NDArray[np.bool_]) -> None:
+    def command(self, time: float, command: Command, walking: NDArray[np.bool_], swing: ArrayLike = np.inf) -> None:
         """Follow a command from a time on, s, not before the last one, with the robots that still walk, mask of shape
-        (robots,); an invalid command raises ParameterError and changes nothing."""
+        (robots,); an invalid command raises ParameterError and changes nothing. Legs arrive within the rest of their
+        ``swing``, s, shape (2,), zero of legs that stand."""
         known = isinstance(command, Command)
         require(known, "must be a chilopod.engine.Command", "command", type(command).__name__)
         within = as_number("command.within", command.within)
@@ -162,7 +164,8 @@ class Actuators:
             self._check(stiffness, walking)
             self._soften(time, stiffness, walking, within)
         if yaw is not None:
-            self._leg_yaw.to(np.where(walking[:, None], yaw, np.nan), time, within)
+            ramp = np.where(within > np.add(swing, _SAME_INSTANT), swing, within)
+            self._leg_yaw.to(np.where(walking[:, None], yaw, np.nan), time, ramp)
         if torque is not None:
             self.driven |= walking & (torque != 0.0).any(axis=1)
             self.joint_torque = np.where(walking[:, None], torque, self.joint_torque)

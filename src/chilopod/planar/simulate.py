@@ -38,8 +38,8 @@ def simulate(
     duration
         Duration of the walks, s; the gait is at phase 0 at time 0.
     controller
-        Controller, called at its events; None keeps the legs straight. In this model a leg's yaw changes at once and
-        matters only while its foot stands.
+        Controller, called at its events; None keeps the legs straight. In this model the yaw of a leg that stands
+        changes at once, and that of a leg that swings before it touches down.
     bearing_noise
         Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events.

@@ -10,7 +10,16 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Command, Observation, Status, Traits, one_thread
-from chilopod.engine.arguments import as_marks, as_robot, as_robots, check_time, check_wishes, rows_anew, standing
+from chilopod.engine.arguments import (
+    BEGINNING,
+    as_marks,
+    as_robot,
+    as_robots,
+    check_time,
+    check_wishes,
+    rows_anew,
+    standing,
+)
 from chilopod.engine.batch import BatchWalk, Beginning, begin, resumed
 from chilopod.errors import ParameterError
 from chilopod.frozen import Array
@@ -116,7 +125,8 @@ def resume(saved: bytes) -> PlanarWalk:
 class PlanarWalk(BatchWalk):
     """Walk on the plane, see :class:`chilopod.engine.Walk`; made by :func:`start`.
 
-    A target is visible in every direction. A leg's yaw changes at once here and matters only while its foot stands.
+    A target is visible in every direction. The yaw of a leg that stands changes at once here, and that of a leg that
+    swings before it touches down.
     """
 
     def __init__(self, begun: Beginning, record: Recording | None, tolerance: float, expected: float = 0.0) -> None:
@@ -203,7 +213,10 @@ class PlanarWalk(BatchWalk):
 
     def command(self, command: Command) -> None:
         here = self._now()
-        self._actuators.command(self._time, command, here[-1] == stretch.WALKING)
+        gait = self._robots[0].gait
+        phase = gait.phases(self._time, 1)[0]
+        swing = np.where(phase < gait.duty - BEGINNING, 0.0, (1.0 - phase) * gait.period)
+        self._actuators.command(self._time, command, here[-1] == stretch.WALKING, swing)
         self._states, self._step, self._status = here
         if self._ahead is not None:
             self._timeline.position, self._ahead = self._ahead[1], None
