@@ -8,7 +8,9 @@ import xarray as xr
 
 from chilopod import load_robot, planar
 from chilopod.analysis.radius_law import radius_laws
-from chilopod.tasks import radius_law
+from chilopod.errors import AnalysisError
+from chilopod.steering import STRATEGIES, Target
+from chilopod.tasks import radius_law, turn
 from chilopod.tasks.radius_law import bent, end_of_walk
 from chilopod.trials import Trial, mean_joint_angles, run, summaries
 from chilopod.twin import simulate
@@ -180,3 +182,16 @@ def test_the_law_by_trials_is_that_of_the_branch_and_is_kept(trying, tmp_path):
         assert law.value(radius) == pytest.approx(exact.value(radius), rel=0.05)
     again = radius_law(robot, trying, tmp_path)
     np.testing.assert_array_equal(law.values, again.values)
+
+
+def test_a_robot_that_jumps_has_no_law_and_turns():
+    robot = load_robot("aoi2022-planar").set_from_text(["legs.forward_offset=20 mm"])
+    target = Target(np.radians(45.0), 0.4)
+    found = turn(robot, target, STRATEGIES["pitchfork"], duration=6.0)
+    assert found.by_law is None
+    assert found.stiffness < max(robot.springs.stiffness)
+    straight = turn(robot, target, STRATEGIES["pitchfork"], max(robot.springs.stiffness), duration=6.0)
+    assert found.criteria.nearest[0] < straight.criteria.nearest[0]
+    for strategy, spring in (("pitchfork", "law"), ("open-loop", "auto")):
+        with pytest.raises(AnalysisError, match=r"radius law.*subcritical.*allowed: a stiffness"):
+            turn(robot, target, STRATEGIES[strategy], spring)

@@ -221,7 +221,8 @@ def driver(
     except AnalysisError as error:
         if strategy.needs_law and controller is None:
             problem = f"strategy {strategy.name} needs a radius law of the first spring"
-            allowed = "a robot that bends (narrower, softer behind, with a longer stride), or the strategy leg-yaw"
+            allowed = "a robot that bends gently (narrower, softer behind, with a longer stride)"
+            allowed = f"{allowed}, the strategy pitchfork with a spring, or the strategy leg-yaw"
             raise AnalysisError(f"{problem}: {error.problem}", allowed=allowed) from error
         unknown = (f"how tightly the robot turns is not known, so shortest paths are straight lines: {error.problem}",)
     ready = strategy.prepare(robot, law, spring, controller)

@@ -148,15 +148,20 @@ def turn(
     trial = Trial(robot, time, target=target, controller=controller, engine=engine, poses=traits.poses)
     check_fits(trial.repeated(options.get("seed"), options.get("repeats", 1)))
     folder, progress = options.get("folder"), options.get("progress", silent)
-    law = None
+    law, by_trials = None, spring == "auto" and (strategy.leg_yaw or controller is not None)
     if isinstance(spring, str) and strategy.springs == K1:
-        law = radius_law(robot, engine, folder, part(progress, 0.0, 0.4, "radius law"))
+        try:
+            law = radius_law(robot, engine, folder, part(progress, 0.0, 0.4, "radius law"))
+        except AnalysisError as error:
+            if not by_trials:
+                problem = f"needs a radius law of the first spring: {error.problem}"
+                raise AnalysisError(problem, field="spring", value=spring, allowed="a stiffness") from error
     by_law = law.value(target.radius) if law else None
     if strategy.springs is None:
         stiffness = None
     elif not isinstance(spring, str):
         stiffness = spring
-    elif spring == "law" or not (strategy.leg_yaw or controller):
+    elif not by_trials:
         if by_law is None:
             raise AnalysisError("must be the first spring for a radius law", field="spring", value=spring)
         stiffness = by_law
