@@ -153,6 +153,8 @@ def turn(
         try:
             law = radius_law(robot, engine, folder, part(progress, 0.0, 0.4, "radius law"))
         except AnalysisError as error:
+            if error.field != "branch":
+                raise
             if not by_trials:
                 problem = f"needs a radius law of the first spring: {error.problem}"
                 raise AnalysisError(problem, field="spring", value=spring, allowed="a stiffness") from error
