@@ -73,7 +73,7 @@ def fit() -> Identification:
     return Identification(
         given=robot, data=critical_mode_data(), constants=np.array([robot.get(path) for path in FREE]), residuals=off,
         starts=np.zeros((1, 3)), preset_residuals=given, ranges=ranges, intervals=np.full((3, 2), np.nan),
-        cut=np.zeros((2, 3, 2), dtype=bool), spread=np.eye(3), profile=profile,
+        cut=np.zeros((2, 3, 2), dtype=bool), spread=np.eye(3), group=np.full(2, np.nan), profile=profile,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ import typer
 from chilopod.cli.commands import new_app
 from chilopod.cli.options import RobotOptions, deliver, free, json_text, print_result, with_options
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import AnalysisError, ParameterError, UnitError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError, UnitError
 
 if TYPE_CHECKING:
     from chilopod.output import Content
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from chilopod.tasks import identify
 
     Found = identify.Identification | identify.RecordedIdentification | identify.TwinIdentification
-    More = dict[str, identify.NextMeasurements | identify.SelfTest]
+    More = dict[str, identify.NextMeasurements | identify.SelfTest | "_Nothing"]
 
 app = new_app("Find constants of a model from measured or printed numbers.")
 
@@ -73,6 +73,20 @@ class _Options(RobotOptions):
         deliver(lambda: write_all(files, replace=self.force), lambda: print_result(result, lines, self.as_json))
 
 
+@dataclass(frozen=True)
+class _Nothing:
+    """Reason why an identification has no result of an option."""
+
+    option: str
+    problem: str
+
+    def as_json(self) -> dict[str, str]:
+        return {"problem": self.problem}
+
+    def lines(self) -> list[str]:
+        return [f"no result of --{self.option}: {self.problem}"]
+
+
 _POINTS = 25
 
 
@@ -121,11 +135,17 @@ def planar(options: _PlanarOptions) -> None:
             folder = given.parent if given else Path()
             return identify.identify_recorded(robot, data, folder, progress("identification")), {}
         found = identify.identify_planar(robot, data, options.points, variants, progress("identification"))
-        more: More = {}
+        asked: dict[str, Callable[..., identify.NextMeasurements | identify.SelfTest]] = {}
         if options.measure:
-            more["next"] = identify.next_measurements(found, progress=progress("next measurements"))
+            asked["next"] = partial(identify.next_measurements, found)
         if options.check:
-            more["check"] = identify.self_test(found.best, data, options.check, progress=progress("self-test"))
+            asked["check"] = partial(identify.self_test, found.best, data, options.check)
+        more: More = {}
+        for option, result in asked.items():
+            try:
+                more[option] = result(progress=progress(f"--{option}"))
+            except ChilopodError as error:  # the identification is there without it
+                more[option] = _Nothing(option, str(error))
         return found, more
 
     options.identify(solve)

@@ -120,6 +120,11 @@ def test_a_self_test_counts_and_robots_depend_on_their_number_alone(monkeypatch)
     assert "ground.friction" in str(both)
 
 
+def test_a_tolerance_of_k1_that_rounds_it_to_nothing_is_refused():
+    with pytest.raises(AnalysisError, match="the tolerance of k1 must leave a spring above 0"):
+        self_test(ROBOT, DATA.model_copy(update={"k1_tolerance": 2.0 * DATA.k1}), 1)
+
+
 def test_data_that_leave_a_combination_open_bound_nothing(found):
     # The spring and the mode of three modules are two numbers for three constants.
     robot, far = ROBOT.with_value("body.modules", 3), (0.5 * DATA.k1, 5.0 * DATA.k1)
@@ -128,8 +133,10 @@ def test_data_that_leave_a_combination_open_bound_nothing(found):
     assert np.isnan(
         planar_fit.confidence_intervals(robot, data, np.array([robot.get(path) for path in planar_fit.FREE]))[0]
     ).all()
-    with pytest.raises(AnalysisError, match=r"free = .*: must be bounded by the data"):
+    with pytest.raises(AnalysisError, match="the data must bound all combinations of the constants"):
         next_measurements(dataclasses.replace(found, given=robot, data=data), [])
+    with pytest.raises(AnalysisError, match="the tolerances must explain the residuals"):
+        next_measurements(dataclasses.replace(found, spread=np.full((3, 3), np.nan)), [])
 
 
 def test_the_command_ranks_measurements_and_tests_itself(found, tmp_path, monkeypatch, capsys):
@@ -146,3 +153,28 @@ def test_the_command_ranks_measurements_and_tests_itself(found, tmp_path, monkey
     out = capsys.readouterr().out
     assert "left out: a push: none" in out
     assert "self-test, 1 robots" in out
+
+
+def test_an_identification_is_written_though_nothing_tells_what_to_measure_and_no_robot_tests_it(
+    found, tmp_path, monkeypatch, capsys
+):
+    def untested(*_, **__):
+        raise AnalysisError("robot must have neighbours with a pitchfork")
+
+    open_ = dataclasses.replace(found, spread=np.full((3, 3), np.nan))
+    monkeypatch.setattr(identify, "identify_planar", lambda *_, **__: open_)
+    monkeypatch.setattr(identify, "self_test", untested)
+    monkeypatch.setattr("chilopod.show.figures.identification.panel", lambda found: None)
+    monkeypatch.setattr("chilopod.show.files.panel_files", lambda *_: [])
+    arguments = ["identify", "planar", "--next", "--check", "1", "--out", str(tmp_path)]
+    assert main([*arguments, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["next"] == {"problem": "as standard errors the tolerances must explain the residuals"}
+    assert printed["check"] == {"problem": "robot must have neighbours with a pitchfork"}
+    assert printed["constants"]["ground.friction"]["value_si"] == found.constants[0]
+    assert (tmp_path / "identified.toml").exists()
+    assert main([*arguments, "--force"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("aoi2022-planar: largest residual 0.7")
+    assert "no result of --next: as standard errors the tolerances must explain the residuals\n" in out
+    assert "no result of --check: robot must have neighbours with a pitchfork\n" in out

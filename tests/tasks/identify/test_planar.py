@@ -52,6 +52,60 @@ def test_ranges_are_the_projection_of_what_the_tolerances_allow(found):
     assert np.ptp(seen[:, 0]) > 0.2 * np.ptp(ranges[0])
 
 
+def test_the_group_of_the_critical_spring_is_that_of_the_robot_with_the_constants(found):
+    (value, *ends), *others = found.groups().values()
+    robot, gait = found.best, found.best.gait
+    spring = planar_fit.searched(robot, DATA.between)[0]
+    assert value == pytest.approx(spring / (robot.ground.friction * gait.speed * gait.duty * robot.module_length))
+    # By a program of its own; with k1 of the data in place of the robot's they would be 0.2354 and 0.2684.
+    np.testing.assert_allclose(ends, [0.2257, 0.2751], atol=1e-4)
+    lengths = np.array([found.constants[1:], *found.ranges[1:].T]).T / robot.module_length
+    np.testing.assert_allclose(others, lengths)
+
+
+def modelled(monkeypatch, model):
+    """Robots with a pitchfork of known spring, over that of the data, and mode, of constants in their own units, whose
+    two components have data 0.6 and 0.8."""
+    robot = ROBOT.with_value("body.modules", 3)
+    data = DATA.model_copy(update={"components": (0.6, 0.8), "component_tolerance": 0.02})
+    scale = planar_fit.scale_of(robot, data)
+
+    def beside(self, other):
+        spring, *mode = model(*(np.array([other.get(path) for path in planar_fit.FREE]) / scale))
+        return spring * data.k1, np.array(mode)
+
+    def searched(other, between):
+        found = beside(None, other)
+        return found if between[0] <= found[0] <= between[1] else None
+
+    monkeypatch.setattr(planar_fit.Pitchforks, "__call__", beside)
+    monkeypatch.setattr(planar_fit, "searched", searched)
+    return robot, data, scale
+
+
+def test_the_group_ends_where_the_mode_does_if_friction_makes_up_for_the_spring(monkeypatch):
+    robot, data, scale = modelled(
+        monkeypatch, lambda friction, width, offset: (friction * width * offset, width, offset)
+    )
+    best = np.array([1.0 / 0.48, 0.6, 0.8]) * scale
+    ranges, cut = planar_fit.allowed_ranges(robot, data, best, goals=4)
+    low, high, part = 0.58 * 0.78, 0.62 * 0.82, data.k1_tolerance / data.k1
+    expected = [[(1.0 - part) / high, (1.0 + part) / low], [0.58, 0.62], [0.78, 0.82], [low, high]]
+    np.testing.assert_allclose(ranges / np.append(scale, 0.25)[:, None], expected, rtol=1e-5)
+    assert not cut.any()
+    contrary = data.model_copy(update={"components": (-0.6, 0.8)})
+    assert np.isnan(planar_fit.allowed_ranges(robot, contrary, best, goals=4)[0]).tolist() == [[True, True]] * 4
+
+
+def test_a_fit_that_contradictory_data_pull_out_of_their_interval_ends_within(monkeypatch):
+    """The mode asks for 0.6 of the spring of the data, whose interval ends at 0.9 of it."""
+    robot, data, scale = modelled(monkeypatch, lambda friction, width, offset: (friction, width, 0.2 + friction))
+    data = data.model_copy(update={"between": (0.9 * data.k1, 2.0 * data.k1)})
+    constants, off = planar_fit._fit(robot, data, np.array([1.5, 0.45, 0.3]) * scale)
+    np.testing.assert_allclose(constants[:2] / scale[:2], [0.9, 0.6], rtol=1e-6)
+    np.testing.assert_allclose(off, [-0.1 * data.k1 / data.k1_tolerance, 0.0, 0.3 / 0.02], atol=1e-4)
+
+
 def test_ranges_hold_the_constants_of_a_robot_of_another_size():
     settings = ["body.length=0.45 m", "body.mass=2 kg", "gait.stride=1 cm", "springs.stiffness=2 N*mm/deg"]
     robot, true = ROBOT.set_from_text(settings), np.array([90.0, 0.02, 0.012])

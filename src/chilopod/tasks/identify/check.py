@@ -73,6 +73,8 @@ def self_test(robot: Robot, data: CriticalMode, count: int, seed: int = 0, progr
 
 
 def _fitted(robot: Robot, data: CriticalMode) -> tuple[CriticalMode, Array]:
+    if data.k1 <= 0.0:
+        raise AnalysisError("the tolerance of k1 must leave a spring above 0 to robots that are made up")
     return data, planar_fit.best_of(planar_fit.fits_from_every_start(robot, data))[0]
 
 
@@ -92,7 +94,7 @@ def made_up(robot: Robot, data: CriticalMode, rng: np.random.Generator) -> tuple
         found = planar_fit.searched(planar_fit.with_constants(other, constants), exact.between)
         if found is not None:
             return other, constants, exact.model_copy(update={"k1": found[0], "components": tuple(found[1].tolist())})
-    raise AnalysisError("must have neighbours with a pitchfork", field="robot", value=robot.name)
+    raise AnalysisError(f"{robot.name} must have neighbours with a pitchfork")
 
 
 def rounded(data: CriticalMode) -> CriticalMode:

@@ -79,9 +79,10 @@ def next_measurements(
     ``free``; the others are taken as they were found. AnalysisError if the data leave a combination open."""
     columns = [FREE.index(path) for path in free]
     known = jacobian(found.given, found.data, found.constants)[:, columns]
+    if np.isnan(found.spread).any():
+        raise AnalysisError("as standard errors the tolerances must explain the residuals")
     if not determined(known):
-        problem = "must be bounded by the data: they leave a combination open"
-        raise AnalysisError(problem, field="free", value=list(free))
+        raise AnalysisError("the data must bound all combinations of the constants; they leave one open")
     now, information = _widths(known, found.residuals), known.T @ known
     rows, left_out = [], {}
     given = list(usual(found)) if candidates is None else candidates

@@ -53,7 +53,9 @@ class Identification(Identified):
     tolerance; ``intervals`` are 90 % profiles of chi-square, if tolerances are standard errors: shape (3, 2), SI, NaN
     where there is none. ``cut`` says of their ends whether the bounds of the search, of any constant, cut them, shape
     (2, 3, 2). ``spread`` has squares of the halves of the intervals for linear residuals, and products between them,
-    SI, shape (3, 3), NaN where standard errors do not explain the residuals. ``profile`` has, over ``forward_offset``,
+    SI, shape (3, 3), NaN where standard errors do not explain the residuals. ``group`` has the ends of
+    k/(c v duty L), with the critical spring k, where every datum is met, shape (2,), NaN where none is found.
+    ``profile`` has, over ``forward_offset``,
     the fitted constants, the largest residual, and predictions of numbers that were not fitted.
     """
 
@@ -67,6 +69,7 @@ class Identification(Identified):
     intervals: Array
     cut: Array
     spread: Array
+    group: Array
     profile: xr.Dataset
 
     def allowed(self, path: str) -> tuple[float, float] | None:
@@ -75,10 +78,11 @@ class Identification(Identified):
         return None if np.isnan(low) else (low, high)
 
     def groups(self) -> dict[str, list[float | None]]:
-        """Groups without unit that the critical spring and its mode depend on: value of the best constants, least and
-        greatest value that the data allow, None where they allow none."""
+        """Groups without unit that the critical spring and its mode depend on: value of the robot with the best
+        constants, least and greatest value of robots that meet all data, None where none is found."""
         found = np.column_stack([self.constants, self.ranges]) / planar_fit.scale_of(self.given, self.data)[:, None]
-        found[0] = 0.25 / found[0, [0, 2, 1]]
+        spring = 1.0 + self.residuals[0] * self.data.k1_tolerance / self.data.k1
+        found[0] = 0.25 * spring / found[0, 0], *self.group
         names = "k1/(friction*speed*duty*module_length)", "half_width/module_length", "forward_offset/module_length"
         return {name: [*map(finite, row)] for name, row in zip(names, found.tolist(), strict=True)}
 
@@ -151,10 +155,10 @@ def identify_planar(
     or no pitchfork with any constants."""
     fits = planar_fit.fits_from_every_start(robot, data, progress)
     best = planar_fit.best_of(fits)
-    ranges, cut = planar_fit.allowed_ranges(robot, data, best[0])
+    allowed, cut = planar_fit.allowed_ranges(robot, data, best[0], goals=len(FREE) + 1)
     progress(0.4, "ranges")
     explained = (best[1] ** 2).sum() <= chi2.ppf(_LIKELY, max(best[1].size - len(FREE), 1))
-    intervals, also_cut = planar_fit.confidence_intervals(robot, data, best[0]) if explained else planar_fit.NONE
+    intervals, also_cut = planar_fit.confidence_intervals(robot, data, best[0]) if explained else planar_fit.no_ends()
     return Identification(
         given=robot,
         data=data,
@@ -162,11 +166,12 @@ def identify_planar(
         residuals=best[1],
         starts=np.array([fit[0] for fit in fits]),
         preset_residuals=residuals(robot, data),
-        ranges=ranges,
+        ranges=allowed[:-1],
         intervals=intervals,
-        cut=np.array([cut, also_cut]),
+        cut=np.array([cut[:-1], also_cut]),
         spread=(1.0 if explained else np.nan) * planar_fit.spread(robot, data, best[0]),
-        profile=_profile(robot, data, best[0], ranges[2], points, variants, progress),
+        group=allowed[-1],
+        profile=_profile(robot, data, best[0], allowed[2], points, variants, progress),
     )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -48,9 +49,18 @@ _MOST_LOST = 20  # robots without a pitchfork, in one search for an end
 
 Ends = tuple[Array, NDArray[np.bool_]]
 """Least and largest value of each constant in a set of constants, SI, and whether the bounds of the search, of this or
-another constant, cut the set there, shape (3, 2) each."""
+another constant, cut the set there, shape (3, 2) each. A fourth row is that of a fourth goal."""
 
-NONE: Ends = np.full((len(FREE), 2), np.nan), np.zeros((len(FREE), 2), dtype=bool)
+Aim = Callable[[Array], tuple[float, Array]]
+"""Number that is to be least, of constants in units of :func:`scale_of`, and its derivatives."""
+
+_Room = Callable[..., Any]
+
+
+def no_ends(goals: int = len(FREE)) -> Ends:
+    """Ends of nothing, in so many rows."""
+    return np.full((goals, 2), np.nan), np.zeros((goals, 2), dtype=bool)
+
 
 Critical = tuple[float, Array]
 """Critical k1, N*m/rad, and joint angles of the mode, of unit norm and positive sum, shape (N-1,)."""
@@ -180,6 +190,19 @@ class _Residuals:
         beside = np.array([self(step) for step in scaled + _STEP * np.eye(len(FREE))])
         return ((beside - self(scaled)) / _STEP).T
 
+    def norm(self, scaled: Array) -> tuple[float, Array]:
+        """Root of chi-square, and its derivatives."""
+        size = float(np.linalg.norm(self(scaled)))
+        return size, self(scaled) @ self.jacobian(scaled) / max(size, _ROOM)
+
+    def goal(self, index: int, sign: float, scaled: Array) -> tuple[float, Array]:
+        """A constant or, after them, 4 k/(c v duty L) with the critical spring k, times a sign, and derivatives."""
+        if index < len(FREE):
+            return sign * float(scaled[index]), sign * np.eye(len(FREE))[index]
+        part, friction = self._data.k1_tolerance / self._data.k1, float(scaled[0])
+        group = (1.0 + part * float(self(scaled)[0])) / friction
+        return sign * group, sign * (part * self.jacobian(scaled)[0] - group * np.eye(len(FREE))[0]) / friction
+
 
 def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
     """Spring and mode less the data, over their tolerances."""
@@ -189,17 +212,19 @@ def _off(found: Critical | None, robot: Robot, data: CriticalMode) -> Array:
     return np.append((found[0] - data.k1) / data.k1_tolerance, components)
 
 
-def allowed_ranges(robot: Robot, data: CriticalMode, best: Array) -> Ends:
-    """Projections of the set {max |residual| <= 1}; NaN if it is empty, ends of the search where none is found."""
+def allowed_ranges(robot: Robot, data: CriticalMode, best: Array, goals: int = len(FREE)) -> Ends:
+    """Projections of the set {max |residual| <= 1}; NaN if it is empty, ends of the search where none is found. With
+    four ``goals`` also the ends of k/(c v duty L) with the critical spring k, NaN where none is found."""
 
     def largest(constants: Array) -> float:
         return float(np.abs(residuals(with_constants(robot, constants), data)).max())
 
     start = min(best, least_largest(robot, data, best, fixed=()), key=largest)
     if largest(start) > 1.0 + _ROOM:
-        return NONE
-    found, cut = _ends(robot, data, start, lambda off: 1.0 - _both_signs(off), lambda _, slopes: -_both_signs(slopes))
-    return np.where(np.isnan(found), np.array(_BOUNDS) * scale_of(robot, data)[:, None], found), cut
+        return no_ends(goals)
+    found, cut = _ends(robot, data, start, lambda off: 1.0 - _both_signs(off), lambda _, by: -_both_signs(by), goals)
+    limits = np.array([*(np.array(_BOUNDS) * scale_of(robot, data)[:, None]), [np.nan] * 2])[:goals]
+    return np.where(np.isnan(found), limits, found), cut
 
 
 def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Ends:
@@ -208,51 +233,50 @@ def confidence_intervals(robot: Robot, data: CriticalMode, best: Array) -> Ends:
     off = _Residuals(robot, data)
     here = best / scale_of(robot, data)
     if not determined(off.jacobian(here)):
-        return NONE
+        return no_ends()
     most = float((off(here) ** 2).sum() + _RISE)
     return _ends(robot, data, best, lambda off: most - np.sum(off**2), lambda off, slopes: -2.0 * off @ slopes)
 
 
-def _ends(
-    robot: Robot, data: CriticalMode, start: Array, room: Callable[[Array], Any], slope: Callable[[Array, Array], Array]
-) -> Ends:
-    """Ends of a set that contains some constants; NaN where none is found. In the set no component of
-    ``room(residuals)`` is negative; ``slope(residuals, their derivatives)`` is its derivative. The set is a curved
-    valley, so each end is searched from that of the ends before which is nearest to it too. The residuals at an end are
-    searched anew. It lies on the edge of the set or of the search."""
+def _ends(robot: Robot, data: CriticalMode, start: Array, room: _Room, slope: _Room, goals: int = len(FREE)) -> Ends:
+    """Ends of a set that contains some constants, of three or four ``goals``; NaN where none is found. In the set no
+    component of ``room(residuals)`` is negative; ``slope(residuals, their derivatives)`` is its derivative. The set is
+    a curved valley, so each end is searched from that of the ends before which is nearest to it too. The residuals at
+    an end are searched anew. It lies on the edge of the set, or where the search ends every constant of the goal."""
     off, scale, limits = _Residuals(robot, data), scale_of(robot, data), np.array(_BOUNDS)
     within = {"fun": lambda x: room(off.watched(x)), "jac": lambda x: slope(off(x), off.jacobian(x))}
-    ends = np.full((len(FREE), 2, len(FREE)), np.nan)
-    for constant, side in np.ndindex(len(FREE), 2):
-        goal = (1.0, -1.0)[side] * np.eye(len(FREE))[constant]
-        known = sorted(ends[np.isfinite(ends).all(axis=2)], key=lambda end: float(goal @ end))
+    ends, values = np.full((goals, 2, len(FREE)), np.nan), np.full((goals, 2), np.nan)
+    for (index, side), sign in zip(np.ndindex(goals, 2), (1.0, -1.0) * goals, strict=True):
+        aim = partial(off.goal, index, sign)
+        known = sorted(ends[np.isfinite(ends).all(axis=2)], key=lambda end: aim(end)[0])
         for begin in (start / scale, *known[:1]):
-            found = _farthest(goal, begin, within, off)
-            if goal @ found >= goal @ ends[constant, side]:
+            found = _farthest(aim, begin, within, off)
+            value, slopes = aim(found)
+            if value >= sign * values[index, side]:
                 continue
             both = off(found), residuals(with_constants(robot, found * scale), data)
             left = min(float(np.min(room(each))) for each in both)
-            at_limit = np.abs(found[constant] - limits[constant]).min() <= _STEP  # to rounding
-            if left >= -_ROOM and (left <= _EDGE or at_limit):
-                ends[constant, side] = found
+            at_limit = np.abs(found[:, None] - limits).min(axis=1) <= _STEP  # to rounding
+            if left >= -_ROOM and (left <= _EDGE or at_limit[slopes != 0.0].all()):
+                ends[index, side], values[index, side] = found, sign * value
     cut = (np.abs(ends[..., None] - limits) <= _STEP).any(axis=(2, 3))
-    return np.array([ends[i, :, i] for i in range(len(FREE))]) * scale[:, None], cut
+    return values * np.append(scale, 0.25)[:goals, None], cut
 
 
 def _both_signs(off: Array) -> Array:
     return np.concatenate([off, -off])
 
 
-def _farthest(slopes: Array, start: Array, within: dict[str, Any], off: _Residuals) -> Array:
-    """Place where a linear function with these slopes is least within the bounds and a constraint, by sequential
-    quadratic programming in boxes about the last place, which grow while it succeeds: far away the linear constraint
-    misleads, or robots have no pitchfork."""
+def _farthest(aim: Aim, start: Array, within: dict[str, Any], off: _Residuals) -> Array:
+    """Place where a number is least within the bounds and a constraint, by sequential quadratic programming in boxes
+    about the last place, which grow while it succeeds: far away the linear constraint misleads, or robots have no
+    pitchfork."""
     here, reach, off.lost = start, _FIRST_REACH, 0
     with suppress(_LostError):
         while reach > _LAST_REACH:
             box = np.clip(here[:, None] + reach * np.array([-1.0, 1.0]), *np.split(np.array(_BOUNDS), 2, axis=1))
-            there = _least(slopes, here, box, within)
-            if np.min(within["fun"](there)) < -_ROOM or slopes @ there >= slopes @ here:
+            there = _least(aim, here, box, within)
+            if np.min(within["fun"](there)) < -_ROOM or aim(there)[0] >= aim(here)[0]:
                 reach *= 0.25
                 continue
             inside = bool((np.abs(there - here) < (1.0 - _ROOM) * reach).all())
@@ -260,10 +284,10 @@ def _farthest(slopes: Array, start: Array, within: dict[str, Any], off: _Residua
     return here
 
 
-def _least(slopes: Array, start: Array, bounds: Any, within: dict[str, Any]) -> Array:
-    """Place where a linear function with these slopes is least within bounds and a constraint."""
+def _least(aim: Aim, start: Array, bounds: Any, within: dict[str, Any]) -> Array:
+    """Place where a number is least within bounds and a constraint."""
     found = minimize(
-        lambda x: slopes @ x, start, jac=lambda x: slopes, method="SLSQP", bounds=bounds,
+        aim, start, jac=True, method="SLSQP", bounds=bounds,
         constraints={"type": "ineq", **within}, options={"maxiter": 60, "ftol": 1e-8},
     )  # fmt: skip
     return np.asarray(found.x)
@@ -306,10 +330,17 @@ def best_of(fits: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
 
 
 def _fit(robot: Robot, data: CriticalMode, start: Array) -> tuple[Array, Array]:
-    """Least squares over the constants; returns these and the residuals."""
+    """Least squares over the constants; returns these and the residuals, searched anew. Newton's method may leave the
+    interval of the data where these contradict each other: such a fit is made once more, within the interval."""
     off, scale = _Residuals(robot, data), scale_of(robot, data)
-    answer = least_squares(off, start / scale, off.jacobian, np.transpose(_BOUNDS), x_scale=0.1, xtol=1e-9)
-    return answer.x * scale, np.asarray(answer.fun)
+    found = least_squares(off, start / scale, off.jacobian, np.transpose(_BOUNDS), x_scale=0.1, xtol=1e-9).x
+    if searched(with_constants(robot, found * scale), data.between) is None:
+        off, signs = _Residuals(robot, data), np.array([1.0, -1.0])
+        ends = (np.array(data.between) - data.k1) / data.k1_tolerance + _ROOM * signs
+        fun, slopes = lambda x: signs * (off.watched(x)[0] - ends), lambda x: np.outer(signs, off.jacobian(x)[0])
+        with suppress(_LostError):
+            found = _least(off.norm, start / scale, _BOUNDS, {"fun": fun, "jac": slopes})
+    return found * scale, residuals(with_constants(robot, found * scale), data)
 
 
 def least_largest(robot: Robot, data: CriticalMode, start: Array, fixed: Sequence[int] = (2,)) -> Array:
@@ -320,8 +351,8 @@ def least_largest(robot: Robot, data: CriticalMode, start: Array, fixed: Sequenc
         "fun": lambda x: x[3] - _both_signs(off.watched(x[:3])),
         "jac": lambda x: np.insert(-_both_signs(off.jacobian(x[:3])), 3, 1.0, axis=1),
     }
-    bounds = [(place[i],) * 2 if i in fixed else each for i, each in enumerate(_BOUNDS)]
+    bounds = [*((place[i],) * 2 if i in fixed else each for i, each in enumerate(_BOUNDS)), (0.0, None)]
     with suppress(_LostError):
-        found = _least(np.eye(4)[3], np.append(place, np.abs(off(place)).max()), [*bounds, (0.0, None)], within)
+        found = _least(lambda x: (x[3], np.eye(4)[3]), np.append(place, np.abs(off(place)).max()), bounds, within)
         return found[:3] * scale_of(robot, data)
     return start
