@@ -125,6 +125,12 @@ def test_a_tolerance_of_k1_that_rounds_it_to_nothing_is_refused():
         self_test(ROBOT, DATA.model_copy(update={"k1_tolerance": 2.0 * DATA.k1}), 1)
 
 
+def test_a_fault_of_a_robot_that_is_made_up_names_it():
+    other, *_ = check.made_up(ROBOT, DATA, np.random.default_rng(0))
+    with pytest.raises(AnalysisError, match="robot = 'a robot that is made up': must have a pitchfork between"):
+        check._fitted(other, DATA.model_copy(update={"between": (1e3, 2e3)}))
+
+
 def test_data_that_leave_a_combination_open_bound_nothing(found):
     # The spring and the mode of three modules are two numbers for three constants.
     robot, far = ROBOT.with_value("body.modules", 3), (0.5 * DATA.k1, 5.0 * DATA.k1)

@@ -85,7 +85,7 @@ def made_up(robot: Robot, data: CriticalMode, rng: np.random.Generator) -> tuple
         size, mass, spring = _SIZES ** rng.uniform(-1.0, 1.0, 3)
         springs = [f"springs.stiffness[{joint}]" for joint in range(robot.body.modules - 1)]
         factors = {"body.length": size, "gait.stride": size, "body.mass": mass, **dict.fromkeys(springs, spring)}
-        other = robot
+        other = robot.with_(name="a robot that is made up")
         for path, factor in factors.items():
             other = other.with_value(path, factor * robot.get(path))
         sizes = {name: spring * getattr(data, name) for name in ("k1", "k1_tolerance")}
