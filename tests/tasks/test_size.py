@@ -15,7 +15,8 @@ from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.progress import silent
 from chilopod.robot import Robot, load_robot
 from chilopod.tasks import size, sizing
-from chilopod.tasks.sizing.search import FAILED, Outcome, Search, Wish, parsed_wish
+from chilopod.tasks.sizing import parsed_wish
+from chilopod.tasks.sizing.search import FAILED, Outcome, Search, Wish
 from chilopod.trials import NONE, Trial, run, summaries
 
 ROBOT = load_robot("aoi2022-planar")
@@ -235,7 +236,10 @@ def test_quantities_agree_with_other_computations():
     spring = stiffness(9.0)
     robot, measured = ROBOT.with_value(K1, spring), Measured(Onset())
     walks = curved_walks(ROBOT, K1, (spring, stiffness(15.0)))
+    both = []
     for _ in range(2):  # from the branch, and corrected
+        names = "radius", "speed", "settling", "work"
+        both.append([(getattr(measured, name)(robot), measured.error(name, robot)) for name in names])
         assert measured.radius(robot) == pytest.approx(float(walks.axis_radius[-1]), rel=1e-9)
         assert measured.speed(robot) == pytest.approx(float(walks.speed[-1]), rel=1e-9)
         slowest = -ROBOT.gait.period / np.log(float(walks.multiplier[-1]))
@@ -246,8 +250,12 @@ def test_quantities_agree_with_other_computations():
     assert measured.margin(robot) == pytest.approx(spring / onset - 1.0, rel=1e-9)
     angle = float(walks.mean_angle[-1, 0])
     assert measured.work(robot) == pytest.approx(0.5 * angle**2 * (onset - spring), rel=1e-6)
-    # The derivative of the onset by the friction, 0.1815 % per %, is that of `sensitivity`.
-    assert measured.friction(robot) == pytest.approx(0.1815, rel=1e-3)
+    (first, second), errors = np.array(both)[..., 0], np.array(both)[..., 1]
+    assert (np.abs(first - second) <= errors.sum(axis=0)).all()
+    assert (errors < 1e-8 * np.abs(first)).all()
+    bound = Onset().first(robot).point.error_bound
+    assert bound <= measured.error("onset", robot) <= 1.01 * bound
+    assert measured.error("margin", robot) == pytest.approx(bound * spring / onset**2, rel=0.01)
 
 
 def test_shares_are_wishes_without_a_unit():
@@ -309,7 +317,7 @@ def test_curved_walks_beside_a_stable_straight_one_are_said_not_to_be_searched()
 def test_a_radius_of_a_gait_without_mirror_symmetry_is_refused_at_once(monkeypatch):
     uneven, said = ROBOT.override("gait.side_phase", "170 deg"), r"^radius: the onset is transcritical, and no pair"
     monkeypatch.setattr(Search, "run", None)
-    for wished in ("0.8 m", "<0.8 m"):
+    for wished in ("0.8 m", "<0.8 m", ">0.8 m"):
         with pytest.raises(AnalysisError, match=said):
             size(uneven, {"radius": wished, "speed": "0.1 m/s"}, [SPRING])
     with pytest.raises(AnalysisError, match=r"^work: the onset"):
@@ -347,7 +355,12 @@ def test_an_onset_that_is_met_is_the_first_one():
     assert found.outcome is Outcome.UNMET  # where 2e-5 is critical, the walk is unstable at both ends
     found = size(tiny, {"onset": onset}, [("legs.forward_offset", 0.0, 0.003)], onset=Onset(K1, (low, 1.25 * onset)))
     assert found.values[0] == pytest.approx(onset, rel=1e-5)
-    assert found.bound < 1e-12
+    # The onset has a bound of its own; the slope is that of onsets on both sides.
+    (offset,), step = found.numbers, 1e-6
+    at = (tiny.with_value("legs.forward_offset", each) for each in (offset - step, offset, offset + step))
+    less, here, more = (Onset(K1, (low, 1.25 * onset)).first(robot).point for robot in at)
+    own = here.error_bound * 2.0 * step / abs(more.value - less.value)
+    assert own <= found.bound <= 4.0 * own
 
 
 def test_an_onset_that_jumps_is_no_crash():

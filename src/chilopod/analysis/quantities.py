@@ -1,15 +1,17 @@
 """Numbers that describe how a robot walks straight and bends, as functions of its description.
 
 The leading :class:`Mode` of the straight walk comes from its return map. An :class:`Onset` is the number whose change
-bends the robot; it finds the critical value in an interval, or beside that of a similar robot. :class:`Measured` has a
-method for each of :data:`QUANTITIES`. It keeps the last onset and the last curved walk, from which those of similar
-robots are corrected in a fraction of the time of a search or a branch.
+bends the robot; it finds the critical value in an interval, or beside that of a similar robot; :class:`Leading` has its
+derivatives. :class:`Measured` has a method for each of :data:`QUANTITIES`, and bounds on their errors. It keeps the
+last onset and the last curved walk, from which those of similar robots are corrected in a fraction of the time of a
+search or a branch.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +19,7 @@ from scipy.linalg import eig
 
 from chilopod import units
 from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.derivatives import ROUND_OFF, derivative
 from chilopod.analysis.growth import FATES, Fate, growing
 from chilopod.analysis.parameters import ALL, K1, searched_springs
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, first_loss, interval_text
@@ -27,7 +30,7 @@ from chilopod.planar.along import WalkMeans, walk_means
 from chilopod.planar.stretch import MOST_BENT
 from chilopod.robot import Robot
 from chilopod.robot.parameters import place_of
-from chilopod.stability import find_orbit
+from chilopod.stability import find_orbit, multipliers
 from chilopod.stability.returns import ReturnMap, return_map
 
 _ROUNDS = 12  # of the secant method for a critical value
@@ -47,6 +50,9 @@ QUANTITIES = {
 """Units by the name of the quantity, a method of :class:`Measured`; that of the onset is that of its number."""
 
 TOO_BENT = "the curved walk bends a joint by more than a right angle"
+
+UNEVEN = "gait.side_phase"
+"""Number whose other values end the symmetry of half a period."""
 
 _OF_WALKS = {"radius", "speed", "settling", "work"}  # curved ones
 
@@ -164,6 +170,48 @@ class Onset:
         return leading_mode(robot.with_value(self.parameter, self.interval(robot)[1])).growth > 0.0
 
 
+def size_of(robot: Robot, path: str) -> float:
+    """Size of a number for steps, SI: its own, or a typical one if it is zero."""
+    damping = max(robot.springs.stiffness) * robot.gait.period
+    typical = {"springs.damping": damping, "legs.forward_offset": robot.module_length}
+    return abs(robot.get(path)) or typical.get(path.partition("[")[0], 1.0)
+
+
+class Leading:
+    """Leading mode of a robot, and derivatives of its exponent."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.mode = cache(partial(leading_mode, robot))
+        self.slope = cache(self._slope)
+
+    def _slope(self, path: str, symmetric: bool) -> tuple[complex, float]:
+        """Derivative of the exponent of the leading mode by a number, and its error; see :func:`leading_mode`."""
+        mode: Mode = self.mode(symmetric)
+        own = self._robot.get(path)
+
+        def projected(value: float) -> Array:
+            if value == own:
+                return np.array([1.0, 0.0, mode.duration])
+            image = straight_return(self._robot.with_value(path, value), mode.returns == 2)
+            product = mode.left @ image.jacobian @ mode.right / mode.multiplier
+            return np.array([product.real, product.imag, image.duration])
+
+        (real, imaginary, longer), errors = derivative(projected, own, size_of(self._robot, path))
+        exponent = complex(mode.growth, mode.frequency)
+        slope = (complex(real, imaginary) - exponent * longer) / mode.duration
+        return slope, float(np.hypot(errors[0], errors[1]) + abs(exponent) * errors[2]) / mode.duration
+
+    def onset(self, number: str, path: str) -> tuple[float, float]:
+        """Derivative of the critical value of a number, at which the robot is, by another number, and its error."""
+        if number in (path, path.partition("[")[0]):
+            return 0.0, 0.0  # it is replaced
+        symmetric = UNEVEN not in (number, path)
+        (by_onset, uncertain), (by_path, off) = self.slope(number, symmetric), self.slope(path, symmetric)
+        found = -by_path.real / by_onset.real
+        return found, (off + abs(found) * uncertain) / abs(by_onset.real)
+
+
 class Measured:
     """Quantities of similar robots, SI: their onsets and curved walks are corrected from those of the robot before, but
     onsets are searched in the whole interval if not ``similar``. Each of :data:`QUANTITIES` is a method of a robot, and
@@ -188,6 +236,31 @@ class Measured:
         if name in _OF_WALKS and self.growth(robot) > 0.0 and self.most_bent(robot) > MOST_BENT:
             raise AnalysisError(TOO_BENT, field=name)
         return value
+
+    def error(self, name: str, robot: Robot) -> float:
+        """Bound on the error of a quantity, from those of multipliers, orbits and onsets; of others by rounding."""
+        value, curved = float(getattr(self, name)(robot)), name in _OF_WALKS and self.growth(robot) > 0.0
+        error, model = ROUND_OFF * abs(value), PlanarModel(robot, use_symmetry=not curved)
+        if curved:
+            state, joints = self.state(robot), slice(3, model.modules + 2)
+            orbit = find_orbit(model, state)
+            off = (orbit.error + np.abs(orbit.state - state))[joints].sum() / np.abs(state[joints]).sum()
+            error += 2.0 * float(off) * abs(value)  # squares of the angles enter, at most
+        if name in ("growth", "frequency", "settling"):
+            found = multipliers(model, state if curved else None)
+            rate = float(found.error_bounds[0] / np.abs(found.values[0])) / model.period
+            error += rate * (value**2 if name == "settling" else 1.0)
+        elif name == "friction":
+            error += self._by_friction(robot)[1]
+        elif name in ("onset", "margin", "coefficient") or (name == "work" and curved):
+            point = self.number.first(robot, normal_form=name == "coefficient").point
+            own = robot.get(self.number.parameter)
+            by_onset = {"onset": 1.0, "margin": own / point.value**2, "work": value / (point.value - own)}
+            error += abs(by_onset.get(name, 0.0)) * point.error_bound
+            if name == "coefficient":
+                own_error = np.nan if point.coefficient_error is None else point.coefficient_error
+                error += own_error * abs(value / (point.coefficient or 1.0))
+        return error
 
     def onset(self, robot: Robot) -> float:
         """Critical value of the number."""
@@ -239,11 +312,14 @@ class Measured:
         return -apart if self.number.rises(robot) else apart
 
     def friction(self, robot: Robot) -> float:
-        """Relative change of the onset by a relative change of the friction of the floor, of one per cent."""
+        """Relative change of the onset by a relative change of the friction of the floor."""
+        return self._by_friction(robot)[0]
+
+    def _by_friction(self, robot: Robot) -> tuple[float, float]:
         value, path = self.onset(robot), "ground.friction"
-        ends = (robot.with_value(path, robot.get(path) * (1.0 + part)) for part in (0.01, -0.01))
-        more, less = (self.number.beside(each, value) for each in ends)
-        return (more - less) / (0.02 * value)
+        found = Leading(robot.with_value(self.number.parameter, value)).onset(self.number.parameter, path)
+        slope, error = (each * robot.get(path) / value for each in found)
+        return slope, abs(error)
 
     def work(self, robot: Robot) -> float:
         """Work of an actuator that stiffens the curved walk's spring to the onset, at mean angles, J; 0 if straight."""

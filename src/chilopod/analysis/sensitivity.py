@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ import numpy as np
 from chilopod import units
 from chilopod.analysis.derivatives import ROUND_OFF, derivative
 from chilopod.analysis.parameters import numbers_read
-from chilopod.analysis.quantities import QUANTITIES, Measured, Mode, Onset, leading_mode, straight_return, unit_of
+from chilopod.analysis.quantities import QUANTITIES, UNEVEN, Leading, Measured, Mode, Onset, size_of, unit_of
 from chilopod.errors import AnalysisError, ParameterError, known_names, nearest_name
 from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.notebook import Summary, finite, tornado
@@ -34,7 +34,6 @@ DEFAULT = ("onset", "growth", "frequency")
 """Quantities that take little time."""
 
 _RELATIVE = "onset", "radius"  # shown in % per %; the others may be near zero
-_UNEVEN = "gait.side_phase"  # other values of it end the symmetry of half a period
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,39 +189,6 @@ _Row = tuple[float, list[float], list[float]]
 """Value of a quantity, its derivatives and their errors."""
 
 
-def size_of(robot: Robot, path: str) -> float:
-    """Size of a number for steps, SI: its own, or a typical one if it is zero."""
-    damping = max(robot.springs.stiffness) * robot.gait.period
-    typical = {"springs.damping": damping, "legs.forward_offset": robot.module_length}
-    return abs(robot.get(path)) or typical.get(path.partition("[")[0], 1.0)
-
-
-class _Leading:
-    """Leading mode of a robot, and derivatives of its exponent."""
-
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self.mode = cache(partial(leading_mode, robot))
-        self.slope = cache(self._slope)
-
-    def _slope(self, path: str, symmetric: bool) -> tuple[complex, float]:
-        """Derivative of the exponent of the leading mode by a number, and its error; see :func:`leading_mode`."""
-        mode: Mode = self.mode(symmetric)
-        own = self._robot.get(path)
-
-        def projected(value: float) -> Array:
-            if value == own:
-                return np.array([1.0, 0.0, mode.duration])
-            image = straight_return(self._robot.with_value(path, value), mode.returns == 2)
-            product = mode.left @ image.jacobian @ mode.right / mode.multiplier
-            return np.array([product.real, product.imag, image.duration])
-
-        (real, imaginary, longer), errors = derivative(projected, own, size_of(self._robot, path))
-        exponent = complex(mode.growth, mode.frequency)
-        slope = (complex(real, imaginary) - exponent * longer) / mode.duration
-        return slope, float(np.hypot(errors[0], errors[1]) + abs(exponent) * errors[2]) / mode.duration
-
-
 def _by_each(
     what: str, paths: Sequence[str], show: Progress, slope: Callable[[str], tuple[Any, Any]]
 ) -> tuple[list[Any], list[Any]]:
@@ -236,23 +202,14 @@ def _by_each(
 
 def _onset(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
     value = onset.first(robot).point.value
-    of = _Leading(robot.with_value(onset.parameter, value))
-
-    def slope(path: str) -> tuple[float, float]:
-        if onset.parameter in (path, path.partition("[")[0]):
-            return 0.0, 0.0  # it is replaced
-        symmetric = path != _UNEVEN
-        (by_onset, uncertain), (by_path, off) = of.slope(onset.parameter, symmetric), of.slope(path, symmetric)
-        found = -by_path.real / by_onset.real
-        return found, (off + abs(found) * uncertain) / abs(by_onset.real)
-
-    return {"onset": (value, *_by_each("onset", paths, show, slope))}
+    of = Leading(robot.with_value(onset.parameter, value))
+    return {"onset": (value, *_by_each("onset", paths, show, partial(of.onset, onset.parameter)))}
 
 
 def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
-    of = _Leading(robot)
+    of = Leading(robot)
     mode: Mode = of.mode(True)
-    slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, path != _UNEVEN))
+    slopes, errors = _by_each("growth", paths, show, lambda path: of.slope(path, path != UNEVEN))
     turns = mode.frequency > 0.0
     turning = [turns * slope.imag for slope in slopes], [turns * error for error in errors]
     growth = mode.growth, [slope.real for slope in slopes], errors
@@ -260,8 +217,10 @@ def _growth(robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) ->
 
 
 def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str], show: Progress) -> dict[str, _Row]:
-    function = partial(Measured(onset).walked, name)
-    value, round_off = function(robot), _round_off(name, robot, onset)
+    measured = Measured(onset)
+    function = partial(measured.walked, name)
+    value = function(robot)
+    round_off = measured.error(name, robot) / (abs(value) or 1.0) if name == "friction" else ROUND_OFF  # of differences
 
     def slope(path: str) -> tuple[Any, Any]:
         def at(number: float) -> Array:
@@ -273,16 +232,6 @@ def _differentiated(name: str, robot: Robot, onset: Onset, paths: Sequence[str],
             return np.nan, np.nan
 
     return {name: (value, *_by_each(name, paths, show, slope))}
-
-
-def _round_off(name: str, robot: Robot, onset: Onset) -> float:
-    """Error of a quantity, relative to it."""
-    if name != "friction":
-        return ROUND_OFF
-    # A difference of two onsets over 2 %, each as exact as the multiplier that passes the unit circle there.
-    value = onset.first(robot).point.value
-    of = _Leading(robot.with_value(onset.parameter, value))
-    return 100.0 * ROUND_OFF / abs(of.slope(onset.parameter, True)[0].real * value * of.mode(True).duration)
 
 
 _EXACT = {"onset": _onset, "growth": _growth, "frequency": _growth}

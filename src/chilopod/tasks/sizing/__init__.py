@@ -25,7 +25,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability.shown import bounded
 from chilopod.tasks.radius_law import CYCLES, PERIOD, bent, end_of_walk, is_curved
-from chilopod.tasks.sizing.search import Outcome, Search, Wish, parsed_wish
+from chilopod.tasks.sizing.search import Outcome, Search, Wish
 from chilopod.trials import run
 
 if TYPE_CHECKING:
@@ -227,6 +227,17 @@ def size(
         search.numbers(search.best), bound, outcome, tuple(reasons), rows.reshape(-1, len(axes) + len(given)), walks,
         search.evaluations,
     )  # fmt: skip
+
+
+def parsed_wish(robot: Robot, onset: Onset, name: str, given: float | str) -> Wish:
+    """A wish from its value, SI or text; ParameterError names the fault."""
+    with concerning(name):
+        sense = {"<": -1, ">": 1}.get(given[:1], 0) if isinstance(given, str) else 0
+        unit = robot.si_unit_of(onset.parameter) if name == "onset" else QUANTITIES[name]
+        value = units.parse(given[abs(sense) :].removeprefix("="), unit) if isinstance(given, str) else float(given)
+        if not np.isfinite(value) or (name in ("radius", "speed", "settling") and value <= 0.0):
+            raise ParameterError("must be finite, and positive for a radius, a speed or a time", value=given)
+    return Wish(name, value, sense)
 
 
 def _axes(robot: Robot, free: Sequence[Given]) -> tuple[Axis, ...]:

@@ -29,14 +29,13 @@ from scipy.stats.qmc import Sobol
 from chilopod import units
 from chilopod.analysis.branch import NO_PAIR
 from chilopod.analysis.map_axes import Axis
-from chilopod.analysis.quantities import QUANTITIES, TOO_BENT, Measured, Onset, leading_mode
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError, concerning
+from chilopod.analysis.quantities import TOO_BENT, Measured, Onset, leading_mode
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.frozen import Array
 from chilopod.labels import Labelled
-from chilopod.planar import PlanarModel
 from chilopod.progress import Progress
 from chilopod.robot import Robot
-from chilopod.stability import Criticality, Kind, find_orbit
+from chilopod.stability import Criticality, Kind
 
 FAILED = 10.0
 """Deviation of a robot without the quantity; negative where its curved walk bends too far, as one too tight."""
@@ -86,8 +85,9 @@ class Wish:
             if self.quantity != "radius":
                 return self.deviation(measured.walked(self.quantity, robot))
             growth = leading_mode(robot).growth
-            curvature = self.value / measured.walked("radius", robot) if growth > 0.0 else 0.0
-            return self._one_sided(1.0 - curvature**2 - min(growth, 0.0))
+            if growth <= 0.0:
+                return 1.0 - growth  # also of limits: a robot that walks straight has no radius
+            return self._one_sided(1.0 - (self.value / measured.walked("radius", robot)) ** 2)
         except ChilopodError as error:
             return -FAILED if TOO_BENT in str(error) else FAILED
 
@@ -106,21 +106,10 @@ class Wish:
     @property
     def curved(self) -> bool:
         """True if only a curved walk meets it."""
-        return self.value > 0.0 and self.sense in {"radius": (0, -1), "work": (0, 1)}.get(self.quantity, ())
+        return self.quantity == "radius" or (self.quantity == "work" and self.value > 0.0 and self.sense >= 0)
 
     def _one_sided(self, deviation: float) -> float:
         return max(0.0, deviation * -self.sense) * -self.sense if self.sense else deviation
-
-
-def parsed_wish(robot: Robot, onset: Onset, name: str, given: float | str) -> Wish:
-    """A wish from its value, SI or text; ParameterError names the fault."""
-    with concerning(name):
-        sense = {"<": -1, ">": 1}.get(given[:1], 0) if isinstance(given, str) else 0
-        unit = robot.si_unit_of(onset.parameter) if name == "onset" else QUANTITIES[name]
-        value = units.parse(given[abs(sense) :].removeprefix("="), unit) if isinstance(given, str) else float(given)
-        if not np.isfinite(value) or (name in ("radius", "speed", "settling") and value <= 0.0):
-            raise ParameterError("must be finite, and positive for a radius, a speed or a time", value=given)
-    return Wish(name, value, sense)
 
 
 class _SpentError(Exception):
@@ -170,13 +159,15 @@ class Search:
     def numbers(self, place: Array) -> Array:
         """Free numbers at a place in the unit cube, SI, evenly by their logarithm where they are positive."""
         parts = ((a.low, a.high, part) for a, part in zip(self.axes, np.round(place, 15).tolist(), strict=True))
-        return np.array([a * (b / a) ** part if a > 0.0 else a + (b - a) * part for a, b, part in parts])
+        # Both forms are exact at the ends; between them rounding may pass one.
+        found = [(a ** (1.0 - p) * b**p if a > 0.0 else a * (1.0 - p) + b * p, a, b) for a, b, p in parts]
+        return np.array([min(max(value, low), high) for value, low, high in found])
 
     def at(self, place: Array) -> Robot:
         """Robot at a place in the unit cube."""
         robot = self.robot
         for each, value in zip(self.axes, self.numbers(place).tolist(), strict=True):
-            robot = each.change(robot, float(np.clip(value, each.low, each.high)))
+            robot = each.change(robot, value)
         return robot
 
     def _part(self, each: Axis) -> float:
@@ -192,11 +183,13 @@ class Search:
         self.progress(min(0.99, self.evaluations / self._budget), f"{self.evaluations} evaluations")
         found = self._found(place, self._measured)
         self._seen.append(found)
-        # Far from all wishes, a robot that has every quantity is nearer than one that has not.
-        sizes = [(norm(self._missed(each)), norm(each)) for each in (found, self._least)]
-        if sizes[0] < sizes[1]:
+        if self._sizes(found) < self._sizes(self._least):
             self.best, self._least = place, found
         return found
+
+    def _sizes(self, deviations: Array) -> tuple[float, float]:
+        """Far from all wishes, a robot that has every quantity is nearer than one that has not."""
+        return float(norm(self._missed(deviations))), float(norm(deviations))
 
     def _found(self, place: Array, measured: Measured) -> Array:
         try:
@@ -235,11 +228,20 @@ class Search:
         if len(self.axes) > 1 and not _met(self._least) and cliff:
             with suppress(_SpentError):
                 self._evolve()
-        beside = np.abs(self.best - 0.5) > 0.5 - _AT_END  # ends of ranges, which least squares do not reach
-        with suppress(_SpentError):
-            for i in np.flatnonzero(beside & (not _met(self._least))).tolist():
-                self.deviations(np.where(np.arange(self.best.size) == i, np.round(self.best), self.best))
+        try:
+            self._to_ends()
+        except _SpentError:
+            unmet = Outcome.BUDGET
         return Outcome.MET if _met(self._least) else unmet
+
+    def _to_ends(self) -> None:
+        """Move the best place to the ends of ranges beside it, which least squares do not reach, if it is as near."""
+        beside = (np.abs(self.best - 0.5) > 0.5 - _AT_END) & (self.best != np.round(self.best))
+        for i in np.flatnonzero(beside & (not _met(self._least))).tolist():
+            place = np.where(np.arange(self.best.size) == i, np.round(self.best), self.best)
+            found, least = self.deviations(place), self._least
+            if all(a <= b + _UNCHANGED for a, b in zip(self._sizes(found), self._sizes(least), strict=True)):
+                self.best, self._least = place, found
 
     def _evolve(self) -> None:
         """Search round the best place by evolution, which no cliff stops."""
@@ -285,19 +287,19 @@ class Search:
         return place, self.deviations(place)
 
     def bound(self) -> float:
-        """Bound on the error of a root, SI, by its deviation computed anew; NaN if the number changes nothing."""
-        if not self._changed:
+        """Bound on the error of a root, SI, by what it misses, computed anew, and the error of that; NaN if unknown, or
+        if the number changes nothing."""
+        (wish,), step, again, missed = self.wishes, 1e-5, self.again, np.full(3, FAILED)
+        places = [np.clip(self.best + side * step, 0.0, 1.0) for side in (-1.0, 0.0, 1.0)]
+        with suppress(ChilopodError):
+            # A radius counts by its square, relative to the wished one.
+            share = (2.0 if wish.quantity == "radius" else 1.0) / (abs(wish.value) or 1.0)
+            error = share * again.error(wish.quantity, self.at(self.best))
+            missed = np.array([wish.searched(again, self.at(place)) for place in places])
+        if _failed(missed) or not self._changed or (rise := abs(missed[2] - missed[0]) - 2.0 * error) <= 0.0:
             return np.nan
-        (wish,), step, robot, again = self.wishes, 1e-5, self.at(self.best), self.again
-        off = abs(wish.searched(again, robot)) + 1e-13
-        ends = [np.clip(self.best + side * step, 0.0, 1.0) for side in (-1.0, 1.0)]
-        rise = np.ptp([wish.searched(again, self.at(end)) for end in ends]) / (ends[1] - ends[0])[0]
-        if wish.quantity == "radius":
-            orbit = find_orbit(PlanarModel(robot, use_symmetry=False), again.state(robot))
-            joints = slice(3, robot.body.modules + 2)
-            off += 2.0 * float(np.sum(orbit.error[joints]) / np.sum(np.abs(orbit.state[joints])))
-        wide = np.ptp([self.numbers(end)[0] for end in ends]) / (ends[1] - ends[0])[0]
-        return float(2.0 * off / max(rise, 1e-300) * wide)
+        wide = self.numbers(places[2]) - self.numbers(places[0])
+        return float(2.0 * (abs(missed[1]) + error) / rise * wide[0])
 
     def reasons(self, outcome: Outcome) -> tuple[list[str], list[Array]]:
         """Sentences about what stands in the way, and places on the Pareto front of two wishes that conflict."""
@@ -322,7 +324,8 @@ class Search:
             said.append("the evaluations of the search were spent")
         if (outcome is Outcome.LACKING or not said) and any(-FAILED in each for each in self._seen):
             said.append(f"some robots are left out: {TOO_BENT}")
-        return said or ["no end of a range and no other wish stands in the way"], front
+        nothing = "no end of a range and no other wish is known to stand in the way"
+        return said or [nothing] * (outcome is Outcome.UNMET), front
 
     def _obstacles(self) -> list[str]:
         """Sentences about ends of ranges at the best place, and about wishes that nothing changes."""
@@ -364,6 +367,7 @@ class Search:
             weights = np.full(len(self.wishes), _OTHERS)
             weights[pair] = np.sqrt([1.0 - share, share]) / largest
             found.append(self._fit(np.clip(start, _AT_END, 1.0 - _AT_END), weights)[0])
+        self._to_ends()
         found.append(self.best)
         self._take(len(found))
         again = Measured(self._measured.number, similar=False, following=self._following)
