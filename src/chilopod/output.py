@@ -5,6 +5,7 @@ Every failure raises OutputError, in one line that names the file.
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import stat
@@ -21,6 +22,8 @@ Content = str | bytes | bytearray | IO[bytes]
 """Content of a file: text, to be written as UTF-8, bytes, or another open file."""
 
 _COPIED = 2**24  # bytes at a time
+_logger = logging.getLogger(__name__)
+_unwritten: set[Path] = set()  # folders of which it has been said that they cannot be written
 
 
 @contextmanager
@@ -112,21 +115,37 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
     """Write the files of a result, paths and contents, one after the other as they are given; return their paths.
 
     A file that cannot be written at its path is kept under another name in the same folder, or else in the current
-    folder, and the error names that place.
+    folder, and the error names that place, or the file if there is none.
     """
     written: list[Path] = []
     kept: list[Path] = []
+    lost: list[Path] = []
     failure: OutputError | None = None
     for path, content in files:
         try:
             written.append(write_atomic(path, content, replace=replace))
         except OutputError as error:
             failure = failure or error
-            kept += _kept(path, content)
+            elsewhere = _kept(path, content)
+            kept += elsewhere
+            lost += [] if elsewhere else [path]
     if failure is None:
         return written
     where = f"kept instead: {', '.join(map(str, kept))}" if kept else "no other place could be written"
+    where += f"; lost: {', '.join(map(str, lost))}" if kept and lost else ""
     raise OutputError(f"{failure.problem}; {where}", source=failure.source)
+
+
+def keep(path: Path, content: Content, what: str) -> None:
+    """Write a file that only saves time later. If that fails the work goes on, and one line says that ``what`` the file
+    holds is not kept; another one if its folder could be written in between."""
+    try:
+        write_atomic(path, content)
+        _unwritten.discard(path.parent)
+    except OutputError as error:
+        if path.parent not in _unwritten:
+            _logger.warning("%s: %s are not kept: %s", path.parent, what, error.problem)
+        _unwritten.add(path.parent)
 
 
 def spool(path: Path, size: int = 0) -> IO[bytes]:

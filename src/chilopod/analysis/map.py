@@ -29,7 +29,7 @@ from chilopod.analysis.quantities import TOO_BENT, Measured, Onset
 from chilopod.errors import AnalysisError, ChilopodError, OutputError, ParameterError, known_names
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, netcdf, sealed, unsealed
-from chilopod.output import write_atomic
+from chilopod.output import check_files, keep
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
@@ -77,8 +77,8 @@ def map(
         ``folds`` to follow the folds of the curved walks too, which takes a minute; ``radius`` to compute the radius of
         the curved walks on a lattice of 24 x 24 values, some 50 ms each.
     kept
-        File that holds growth rates while they are computed; a map that was cut off goes on from it. Without it a map
-        that would take more than four hours is refused.
+        File that holds growth rates while they are computed; a map that was cut off goes on from it. If it cannot be
+        written any more, a line in the log says so. Without it a map that would take more than four hours is refused.
     replace
         True if that file may be replaced although it is damaged or belongs to another map.
     remark
@@ -92,6 +92,7 @@ def map(
     file = None if kept is None else Path(kept)
     grid = Grid(plane, points, keep=lambda grid: _keep(grid, file) if file else None)
     if file:
+        check_files([file], replace=True)
         _take(grid, file, replace)
     _announce(grid, remark, points, file is not None)
     wanted = np.zeros((grid.y.size - 1, grid.x.size - 1), dtype=bool)
@@ -228,7 +229,8 @@ def _keep(grid: Grid, file: Path) -> None:
     rows, columns = np.nonzero(grid.computed)
     nodes = {"x": ("node", grid.x[columns]), "y": ("node", grid.y[rows])}
     values = {"values": (("row", "node"), grid.values[:, rows, columns])}
-    write_atomic(file, sealed(netcdf(xr.Dataset(nodes | values, attrs={"key": _key(grid.plane)}))))
+    content = sealed(netcdf(xr.Dataset(nodes | values, attrs={"key": _key(grid.plane)})))
+    keep(file, content, "growth rates")
 
 
 def _take(grid: Grid, file: Path, replace: bool) -> None:

@@ -26,7 +26,7 @@ Given = tuple[str, float | str, float | str]
 
 def _at_speed(robot: Robot, value: float) -> Robot:
     if not (math.isfinite(value) and value > 0.0):
-        raise ParameterError("must be positive", field="speed", value=value)
+        raise ParameterError("must be positive", field="speed", value=f"{value:g} m/s", allowed="more than 0 m/s")
     slower = robot.gait.speed / value
     for path in ("gait.stance", "gait.swing"):
         robot = robot.with_value(path, robot.get(path) * slower)

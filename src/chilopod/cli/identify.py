@@ -65,7 +65,6 @@ class _Options(RobotOptions):
         result = {"robot": self.described.name, **found.as_json()}
         result |= {name: each.as_json() for name, each in more.items()}
         lines = [*found.lines(), *(line for each in more.values() for line in each.lines())]
-        lines.append(f"data, figure and robot file are in {self.out}")
         source = "numbers of Aoi et al. (2022)" if self.data is None else repr(self.data.name)[1:-1]  # printable
         texts = json_text(result) + "\n", found.estimates.identified(source).to_toml()
         figure = panel_files(identification.panel(found), self.out, self.out)

@@ -136,20 +136,23 @@ class OnsetOptions(RobotOptions):
         """The number that bends the robot, its interval, and the value at which walks are studied."""
         return onset_of(self.described, self.parameter, self.between, at)
 
-    def study(self, name: str, compute: Callable[[Progress], Any]) -> Any:
-        """Compute a result, write it into the folder, if there is one, as JSON and as its plot, and print it."""
-        free([self.out / f"{name}.{kind}" for kind in ("json", "svg", "png")] if self.out else [], self.force)
+    def study(self, name: str, compute: Callable[[Progress], Any], robot_file: str | None = None) -> None:
+        """Compute a result, write it into the folder, if there is one, as JSON, as its plot and, if that has a name, as
+        the file of its robot, and print it."""
+        names = [f"{name}.{kind}" for kind in ("json", "svg", "png")] + ([robot_file] if robot_file else [])
+        free([self.out / each for each in names] if self.out else [], self.force)
         with progress_bar(name) as bar:
             found = compute(partial(bar, name))
         result = found.as_json()
+        texts = {robot_file: found.robot.to_toml()} if robot_file else {}
+        texts[f"{name}.json"] = json_text(result) + "\n"
 
         def write() -> list[Path]:
             from chilopod.show import write_result
 
-            return write_result(found, json_text(result) + "\n", name, self.out, replace=self.force) if self.out else []
+            return write_result(found, texts, name, self.out, replace=self.force) if self.out else []
 
         deliver(write, lambda: print_result(result, found.lines(), self.as_json))
-        return found
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -209,15 +209,11 @@ def size(
     ranges = [_range(text) for text in free]
     for path, *ends in ranges:
         note_si(robot, path, f"--free {path}", ends)
-    file = options.free_in(options.out, "sized.toml")
     from chilopod import tasks
-    from chilopod.output import write_atomic
 
     how: dict[str, Any] = {"twin": twin, "budget": budget, "seed": seed}
-    found = options.study("size", lambda progress: tasks.size(robot, wishes, ranges, onset, **how, progress=progress))
-    for each in file:
-        write_atomic(each, found.robot.to_toml(), replace=options.force)
-        typer.echo(f"wrote {each}", err=True)
+    asked = robot, wishes, ranges, onset
+    options.study("size", lambda progress: tasks.size(*asked, **how, progress=progress), "sized.toml")
 
 
 def _range(text: str) -> tuple[str, str, str]:

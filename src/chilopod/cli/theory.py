@@ -291,7 +291,6 @@ def stability_map(
     shown = [name.strip() for name in show.split(",")]
     known_names(shown, SHOWN, "show", "must name pictures")
     also = [name for name, wanted in (("folds", folds), ("radius", "radius" in shown)) if wanted]
-    result = options.free_in(out, "map.json")
     if out:
         from chilopod.show import files_of_map, write_map
 
@@ -304,7 +303,9 @@ def stability_map(
     for name, (path, *ends) in (("x", x), ("y", y)):
         shared.note_si(robot, path, f"--{name} {path}", ends)
 
-    def write() -> list[Path]:
-        return write_map(found, shown, out, replace=options.force) if out else []
+    result = found.as_json()
 
-    shared.deliver(write, lambda: options.deliver_json(result, found.as_json(), found.lines()))
+    def write() -> list[Path]:
+        return write_map(found, shared.json_text(result) + "\n", shown, out, replace=options.force) if out else []
+
+    shared.deliver(write, lambda: shared.print_result(result, found.lines(), options.as_json))

@@ -20,7 +20,7 @@ from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.engine import engine_named
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Array
-from chilopod.output import write_atomic
+from chilopod.output import keep
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.sources import digest
@@ -75,7 +75,7 @@ def kept(folder: Folder, robot: Robot, how: object, compute: Callable[[], list[A
     with suppress(OSError, ValueError):
         return list(json.loads(path.read_text()))
     found = compute()
-    write_atomic(path, json.dumps(found))
+    keep(path, json.dumps(found), "multipliers")
     return found
 
 

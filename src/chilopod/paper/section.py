@@ -173,7 +173,7 @@ def reproduce(
     ``sections`` are those of :func:`chilopod.paper.registry.chosen`, the context by default that of the paper's robots.
     ``progress`` is called during the work. ``callback`` is called after every section, with all results so far and the
     section. Sections that are ``ready``, as their trials are kept, come before others, except the first. An OutputError
-    is raised if trials cannot be kept.
+    is raised if the folder of the trials cannot be used.
     """
     found = Found(context or Context())
     left = list(sections)

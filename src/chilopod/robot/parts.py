@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Self
 from pydantic import model_validator
 
 from chilopod.errors import ParameterError
-from chilopod.units import Description, Flag, Quantity, quantities
+from chilopod.units import Description, Flag, Quantity, format, quantities
 from chilopod.units.quantity import is_list
 
 MODULES: Final = Quantity("", "", at_least=2, at_most=1000, integer=True)
@@ -82,7 +82,8 @@ class Springs(Description):
             for joint, (low, high) in enumerate(zip(self.softest, self.stiffest, strict=False)):
                 if low > high:
                     problem = f"softest must be at most stiffest at joint {joint + 1}"
-                    raise ParameterError(problem, value=f"{low:g} N*m/rad", allowed=f"at most {high:g} N*m/rad")
+                    given, most = (format(end, _STIFFNESS.display, digits=6) for end in (low, high))
+                    raise ParameterError(problem, value=given, allowed=f"at most {most}")
         return self
 
 

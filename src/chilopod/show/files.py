@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -45,27 +45,31 @@ def write_undulation(data: xr.Dataset, folder: str | Path, *, replace: bool = Tr
     return _write_alone(undulation.panel(data), folder, replace)
 
 
-def write_result(result: Summary, text: str, name: str, folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write the text of a result as ``.json``, and its plot as ``.svg`` and ``.png``; errors as of
+def write_result(
+    result: Summary, texts: Mapping[str, str], name: str, folder: str | Path, *, replace: bool = True
+) -> list[Path]:
+    """Write texts of a result by the names of their files, and its plot as ``.svg`` and ``.png``; errors as of
     :func:`chilopod.output.write_all`."""
-    files = [Path(folder) / f"{name}.{kind}" for kind in ("json", "svg", "png")]
+    files = [Path(folder) / each for each in (*texts, f"{name}.svg", f"{name}.png")]
     with style.house_style():
         drawn, axes = style.figure(*_ALONE, False)
         result.plot(axes["A"])
-        contents: list[Content] = [text, style.svg(drawn, name), style.png(drawn)]
+        contents: list[Content] = [*texts.values(), style.svg(drawn, name), style.png(drawn)]
     write_all(zip(files, contents, strict=True), replace=replace)
     return files
 
 
 def files_of_map(folder: str | Path) -> list[Path]:
     """Files that :func:`write_map` writes."""
-    return [Path(folder) / name for name in ("map.nc", "map.csv", "map-curves.csv", "map.svg", "map.png")]
+    return [Path(folder) / name for name in ("map.json", "map.nc", "map.csv", "map-curves.csv", "map.svg", "map.png")]
 
 
-def write_map(found: StabilityMap, shown: Sequence[str], folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write a map as ``map.nc``, its grid as ``map.csv``, its curves as ``map-curves.csv``, and its pictures of
-    some names, see :meth:`StabilityMap.plot`, as ``map.svg`` and ``map.png``; files and errors as of
-    :func:`chilopod.output.write_all`."""
+def write_map(
+    found: StabilityMap, text: str, shown: Sequence[str], folder: str | Path, *, replace: bool = True
+) -> list[Path]:
+    """Write the text of a map as ``map.json``, the map as ``map.nc``, its grid as ``map.csv``, its curves as
+    ``map-curves.csv``, and its pictures of some names, see :meth:`StabilityMap.plot`, as ``map.svg`` and ``map.png``;
+    files and errors as of :func:`chilopod.output.write_all`."""
     data = found.to_dataset()
     about = data.assign_attrs({"robot_toml": ""})
     del about.attrs["robot_toml"]
@@ -79,7 +83,7 @@ def write_map(found: StabilityMap, shown: Sequence[str], folder: str | Path, *, 
         columns = _KEYS_IN_ROW if len(shown) > 1 else _KEYS_IN_ROW // 2
         figure.legend(handles=keys(found, axes[0]), loc="outside lower center", ncols=columns)
         pictures = style.svg(figure, "map"), style.png(figure)
-    contents = netcdf(data), csv(table).encode(), csv(curves).encode(), *pictures
+    contents = text, netcdf(data), csv(table).encode(), csv(curves).encode(), *pictures
     return write_all(zip(files_of_map(folder), contents, strict=True), replace=replace)
 
 

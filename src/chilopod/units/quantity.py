@@ -61,11 +61,13 @@ class Quantity:
 
     def check(self, value: float, given: object = None) -> float:
         """Return `value` (SI units) as a float, an int for whole numbers, if it is in range; otherwise the error
-        shows `given`, the user's text, if there is one."""
+        shows `given`, as the user wrote it, or else the value in the unit of robot files, as its range."""
         value = as_number("", value)
         if self.at_least <= value <= self.at_most and not (self.integer and value != math.floor(value)):
             return int(value) if self.integer else value
         shown = value if given is None else given
+        if given is None and self.display and math.isfinite(value):
+            shown = format(value, self.display, digits=15)  # all that any double holds
         low, high = (format(end, self.display, digits=6) for end in (self.at_least, self.at_most))
         allowed = f"{low} to {high}"
         if not math.isfinite(value):

@@ -30,7 +30,7 @@ from chilopod.engine import engine_named
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.frozen import Array
 from chilopod.notebook import axes_for
-from chilopod.output import check_folder, write_atomic
+from chilopod.output import check_folder, keep
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.constants import CONFIDENCE, Estimates, FreeConstants, Identified
@@ -196,7 +196,7 @@ def walked(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None = N
         found = Series(lost, lost, lost[:, 0])
     if folder:
         kept = {name: each.tolist() for name, each in vars(found).items()}
-        write_atomic(path, json.dumps({"constants": constants.tolist(), **kept}))
+        keep(path, json.dumps({"constants": constants.tolist(), **kept}), "evaluations")
     return given, found
 
 
