@@ -3,12 +3,15 @@
 import errno
 import json
 import os
+from types import SimpleNamespace
 
 import pytest
 
 from chilopod.cli import main
+from chilopod.robot import load_robot
 
 ROBOT = "aoi2022-planar"
+FULL = "cannot be written (No space left on device)"
 INTERVAL = ["--between", "11 N*mm/deg", "13 N*mm/deg"]
 COMMANDS = {
     "stability.json": ["stability", ROBOT],
@@ -68,7 +71,9 @@ def test_what_is_refused_leaves_nothing(capsys, tmp_path, monkeypatch, arguments
     assert os.listdir(tmp_path) == []
 
 
-def test_a_file_of_a_full_disk_is_kept_elsewhere(capsys, tmp_path, monkeypatch):
+@pytest.fixture
+def full_there(monkeypatch, tmp_path):
+    """The folder `there` lies on a full disk, the current one does not."""
     real = os.replace
 
     def full(source, target):
@@ -78,10 +83,44 @@ def test_a_file_of_a_full_disk_is_kept_elsewhere(capsys, tmp_path, monkeypatch):
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(os, "replace", full)
-    (tmp_path / "there").mkdir()
+    return tmp_path
+
+
+def test_a_file_of_a_full_disk_is_kept_elsewhere(capsys, full_there):
+    (full_there / "there").mkdir()
     assert main(["robot", "new", "there/robot.toml"]) == 2
-    assert capsys.readouterr().err.endswith(f"(No space left on device); kept instead: {tmp_path / 'robot.toml'}\n")
-    assert os.listdir(tmp_path / "there") == []
+    assert capsys.readouterr().err.endswith(f"(No space left on device); kept instead: {full_there / 'robot.toml'}\n")
+    assert os.listdir(full_there / "there") == []
+
+
+def test_every_file_of_a_sized_robot_is_kept_elsewhere(capsys, full_there, monkeypatch):
+    robot = load_robot(ROBOT).override("body.mass", "9 kg")
+    found = SimpleNamespace(
+        robot=robot, as_json=lambda: {"robot": ROBOT}, lines=lambda: ["met"], plot=lambda axes: axes
+    )
+    monkeypatch.setattr("chilopod.tasks.size", lambda *_, **__: found)
+    assert main(["size", ROBOT, "--margin", "0.2", "--free", "body.mass=5..10 kg", "--out", "there"]) == 2
+    out, err = capsys.readouterr()
+    names = "sized.toml", "size.json", "size.svg", "size.png"
+    assert (out, sorted(os.listdir())) == ("met\n", sorted(names))
+    kept = ", ".join(str(full_there / name) for name in names)
+    assert err.splitlines()[-1].endswith(
+        f"sized.toml: cannot be written (No space left on device); kept instead: {kept}"
+    )
+    assert load_robot(full_there / "sized.toml") == robot
+
+
+def test_a_map_goes_on_without_its_growth_rates_and_every_file_is_kept_elsewhere(capsys, full_there, caplog):
+    axes = "--x", "springs.stiffness[0]", "1.9", "2", "--y", "legs.half_width", "70 mm", "80 mm"
+    assert main(["map", ROBOT, *axes, "--points", "2", "--show", "kind", "--out", "there", "--json"]) == 2
+    out, err = capsys.readouterr()
+    names = "map.json", "map.nc", "map.csv", "map-curves.csv", "map.svg", "map.png"
+    assert sorted(os.listdir()) == sorted(names)
+    assert json.loads(out) == json.loads((full_there / "map.json").read_text())
+    kept = ", ".join(str(full_there / name) for name in names)
+    assert err.splitlines()[-1].endswith(f"map.json: {FULL}; kept instead: {kept}")
+    (said,) = [each.getMessage() for each in caplog.records if each.name == "chilopod.output"]
+    assert said == f"there: growth rates are not kept: {FULL}"
 
 
 def test_trials_that_a_full_disk_does_not_keep_are_printed_and_said_once(capsys, tmp_path, monkeypatch, caplog):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from chilopod.errors import OutputError
-from chilopod.output import check_files, check_folder, check_room, spool, write_all, write_atomic
+from chilopod.output import check_files, check_folder, check_room, keep, spool, write_all, write_atomic
 
 
 @pytest.fixture
@@ -115,6 +115,38 @@ def test_what_cannot_be_written_where_it_should_go_is_kept_elsewhere(tmp_path, m
     with pytest.raises(OutputError, match=r"a\.nc: cannot be written \(No space.*no other place could be written$"):
         write_all([(there / "a.nc", "1")])
     assert sorted(os.listdir(there)) == ["a.nc", "b-2.nc", "b.nc"]
+
+
+def test_what_is_kept_nowhere_is_named(tmp_path, monkeypatch, full_disk):
+    there, here = tmp_path / "there", tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    full_disk(here)
+    real = os.replace  # which writes here only
+
+    def without_room_for_large_files(source, target):
+        if Path(source).stat().st_size > 1:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", without_room_for_large_files)
+    with pytest.raises(OutputError, match=r"kept instead: .*/here/b\.nc; lost: .*/there/a\.nc, .*/there/c\.nc$"):
+        write_all([(there / "a.nc", "12"), (there / "b.nc", "1"), (there / "c.nc", "12")])
+
+
+def test_a_file_of_progress_stops_nothing_and_is_missed_once(tmp_path, monkeypatch, full_disk, caplog):
+    files = [tmp_path / "new" / each for each in ("a", "b")]
+    said = f"{files[0].parent}: results are not kept: cannot be written (No space left on device)"
+    full_disk(None)
+    for file in files:
+        keep(file, "1", "results")
+    assert ([each.getMessage() for each in caplog.records], os.listdir(tmp_path)) == ([said], [])
+    monkeypatch.undo()  # there is room again
+    keep(files[0], "1", "results")
+    assert files[0].read_text() == "1"
+    full_disk(None)
+    keep(files[1], "1", "results")
+    assert [each.getMessage() for each in caplog.records] == [said, said]
 
 
 def test_what_does_not_fit_is_said_before_it_is_computed(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from chilopod import load_robot
+from chilopod import load_robot, output
 from chilopod.errors import OutputError
 from chilopod.record_file import RecordFile
 from chilopod.trials import Disturbance, Trial, run, together
@@ -61,6 +61,26 @@ def test_a_disk_that_fills_up_stops_no_walk(records, tmp_path, monkeypatch, firs
         with pytest.raises(OutputError, match=r"walks\.nc: cannot be written \(No space left on device\)$"):
             file.write(replace=False)
     assert os.listdir(tmp_path) == []
+
+
+def test_where_its_disk_is_full_it_is_kept_in_the_current_folder(records, tmp_path, monkeypatch):
+    there, here, real = tmp_path / "there", tmp_path / "here", output.tempfile.TemporaryFile
+    there.mkdir(), here.mkdir()
+    monkeypatch.chdir(here)
+
+    def full(*args, dir, **how):
+        if dir == there:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return real(*args, dir=dir, **how)
+
+    monkeypatch.setattr(output.tempfile, "TemporaryFile", full)
+    monkeypatch.setattr(os, "replace", lambda *to: full(dir=to[1].parent).close() or os.rename(*to))
+    with RecordFile(there / "walks.nc", 1) as file:
+        file.add(0, records[0])
+        with pytest.raises(OutputError, match=r"there/walks\.nc: .* on device\); kept instead: .*/here/walks\.nc$"):
+            file.write(replace=False)
+    assert os.listdir(there) == []
+    xr.testing.assert_identical(xr.load_dataset(here / "walks.nc", engine="h5netcdf"), records[0])
 
 
 def test_without_room_there_is_none(records, tmp_path, monkeypatch):

@@ -262,6 +262,34 @@ def test_numeric_path_refuses_too(robot):
             robot.with_value("springs.stiffness[0]", value)
 
 
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (
+            "springs.stiffness[0]",
+            -5e-3 * 180.0 / math.pi,
+            "'-5 N*mm/deg': must be positive; allowed: more than 0 N*mm/",
+        ),
+        ("gait.module_phase", 2.5 * math.pi, "'450 deg': out of range; allowed: -360 deg to 360 deg"),
+        ("body.mass", -1, "'-1 kg': must be positive; allowed: more than 0 kg"),
+        ("ground.friction", -2.5, "'-2.5 N*s/m': must be positive; allowed: more than 0 N*s/m"),
+        ("springs.stiffness[0]", math.inf, "inf: must be finite"),
+        ("body.modules", 1, "1.0: out of range; allowed: 2 to 1000"),
+    ],
+)
+def test_values_and_their_range_have_one_unit(robot, path, value, said):
+    with pytest.raises(ParameterError) as caught:
+        robot.with_value(path, value)
+    assert str(caught.value).startswith(f"{path} = {said}")
+
+
+def test_limits_of_a_spring_are_said_in_the_unit_of_robot_files(robot):
+    with pytest.raises(
+        ParameterError, match=r"= '20 N\*mm/deg': softest .* at joint 1; allowed: at most 10 N\*mm/deg$"
+    ):
+        robot.set_from_text(["springs.stiffest=10 N*mm/deg", "springs.softest=20 N*mm/deg"])
+
+
 def test_numbers_of_any_type_become_floats_that_nobody_can_change(robot):
     mass = np.array(3.0)
     heavier = robot.with_value("body.mass", mass)

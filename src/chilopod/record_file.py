@@ -72,11 +72,15 @@ class RecordFile:
         over = [variable for variable in record.variables.values() if "robot" in variable.dims]
         each = sum(variable.nbytes for variable in over)
         chunks = sum(-(-record.sizes["time"] // _LONGEST) if "time" in variable.dims else 1 for variable in over)
+        size = self._robots * (each + chunks * _A_CHUNK) + _ABOUT
         try:
-            self._spooled = spool(self._path, self._robots * (each + chunks * _A_CHUNK) + _ABOUT)
+            self._spooled = spool(self._path, size)
         except OutputError as error:
-            self._failure = error
-            return
+            try:
+                self._spooled = spool(Path.cwd() / self._path.name, size)  # where the file itself is kept then
+            except OutputError:
+                self._failure = error
+                return
         self._medium = _Medium(self._spooled.fileno(), "r+b", closefd=False)
         # A chunk of the file has one robot, so each record is written contiguously.
         shaped = record.copy()

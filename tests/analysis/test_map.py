@@ -459,7 +459,7 @@ def test_robots_that_cannot_be_are_a_fate_of_their_own():
     assert {FATES[index] for index in found.fate.ravel()} == {Fate.INVALID, Fate.BENDS}
     assert np.isnan(found.growth[:, 0]).all()
     (remark,) = found.remarks
-    assert "there is no robot: springs.stiffness[0]" in remark
+    assert "there is no robot: springs.stiffness[0] = '-10 N*mm/deg': must be positive; allowed: more than 0" in remark
 
 
 def test_every_reason_why_there_is_no_robot_is_said():
@@ -467,6 +467,18 @@ def test_every_reason_why_there_is_no_robot_is_said():
     (remark,) = found.remarks
     assert remark.startswith("at 6 of the values there is no robot: body.modules = 1.0: ")
     assert "; or springs.stiffness[2]: must be the index of a spring" in remark
+
+
+def test_a_speed_that_cannot_be_has_its_unit():
+    with pytest.raises(ParameterError, match=r"^speed = '-1 m/s': must be positive; allowed: more than 0 m/s$"):
+        Plane.over(ROBOT, ("speed", -1.0, 1.0), OFFSET).at(-1.0, 0.0)
+
+
+def test_a_file_for_growth_rates_that_cannot_be_written_is_refused_at_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(map_grid, "growth_rates", None)
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="file: must be a folder, and is a file"):
+        mapped(ROBOT, X, OFFSET, points=5, kept=tmp_path / "file" / "rates.nc")
 
 
 def test_a_map_that_was_cut_off_goes_on(tmp_path, monkeypatch):

@@ -3,12 +3,15 @@
 import dataclasses
 import errno
 import os
+import shutil
 import sys
 from contextlib import ExitStack
+from types import SimpleNamespace
 
 import pytest
 
 from chilopod import load_robot
+from chilopod.errors import OutputError
 from chilopod.trials import Store, Trial, batch, claims, run
 
 BASE = Trial(load_robot("aoi2022-planar"), 0.5, rate=20.0)
@@ -98,6 +101,21 @@ def test_trials_that_a_full_disk_does_not_keep_are_given_all_the_same(tmp_path, 
     again = run(TRIALS, tmp_path)
     assert walked_here == 2 * [0, 1, 2, 3]
     assert all(one.identical(other) for one, other in zip(records, again, strict=True))
+
+
+def test_a_later_study_that_lacks_room_is_given_all_the_same(tmp_path, monkeypatch, caplog):
+    """A command that runs several studies would lose what the first one came to."""
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=0))
+    with pytest.raises(OutputError, match=r"takes .* or more, and there is room for 0 bytes$"):
+        run(TRIALS[:1], tmp_path)
+    monkeypatch.undo()
+    run(TRIALS[:1], tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=0))
+    records = run(TRIALS[:2], tmp_path)
+    assert [record.attrs["trial"] for record in records] == [trial.text for trial in TRIALS[:2]]
+    assert files(tmp_path) == NAMES[:1]
+    (said,) = [each.getMessage() for each in caplog.records if each.name == "chilopod.trials.store"]
+    assert said.startswith(f"{tmp_path}: trials run but are not kept: takes ")
 
 
 def test_where_there_are_no_locks_nobody_shares(tmp_path, monkeypatch):

@@ -77,7 +77,7 @@ def live(options: LiveOptions) -> None:
     out, time = options.out, options.duration
     seconds = math.inf if time is None else shared.quantity("duration", time, "s")
     if not seconds > 0.0:
-        raise ParameterError("must be a time to walk", field="duration", value=time, allowed="more than 0 s")
+        raise ParameterError("must be a time to walk", field="duration", value=seconds, allowed="more than 0 s")
     check_port(options.port)
     if out is not None:
         earlier = out.glob("chilopod-live-*") if out.is_dir() else ()

@@ -96,7 +96,7 @@ def reproduce(options: ReportOptions, ctx: typer.Context) -> None:
     if stopped is not None:
         raise stopped
     if report.failures:
-        raise typer.Exit(1)
+        raise typer.Exit(2 if all(isinstance(each, OutputError) for each in report.failures.values()) else 1)
 
 
 def _computed(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, OutputError
 from chilopod.output import check_room
 from chilopod.progress import Progress, silent
 from chilopod.record import check_memory
@@ -23,6 +23,7 @@ _Walked = list[tuple[Trial, xr.Dataset]]
 
 _COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
 _LOOK = 0.2  # s between two looks whether other processes are done
+_used = set[Path]()  # folders in which this process has run a study
 _PATIENCE = 120.0  # s in which another process must finish a trial; a stopped process never does
 
 
@@ -31,7 +32,7 @@ def run(
 ) -> list[xr.Dataset]:
     """Run trials, or read the records of previous runs; return the record of every trial, with one ``robot`` and the
     trial in the attributes. Raises ParameterError or OutputError if memory cannot hold the records, or the folder has
-    no room for them.
+    no room for them; after another run into it they are given all the same, and one line says that they are not kept.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ class _Study:
     def walk(self, missing: Sequence[Trial]) -> Iterator[tuple[Trial, xr.Dataset]]:
         """Yield trials with their records, walked here or by other processes in the same folder."""
         if self._store:
-            check_room(self._store.folder, sum(trial.least_bytes for trial in missing))
+            self._check_room(self._store, sum(trial.least_bytes for trial in missing))
         share = batches(missing)
         check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
         self._progress(self.done / max(self._total, 1), f"{self.done} of {self._total} trials")
@@ -122,6 +123,18 @@ class _Study:
             for _, record in walked:
                 record.attrs.pop(NOT_KEPT, None)
             yield from self._given(walked)
+
+    def _check_room(self, store: Store, needed: float) -> None:
+        """Refuse the first study of this process in a folder if it lacks room. Trials of a later one, as of a command
+        that runs several, are walked and not kept: a refusal would lose what the others came to."""
+        try:
+            check_room(store.folder, needed)
+            _used.add(store.folder)
+        except OutputError as error:
+            if store.folder not in _used:
+                raise
+            store.tell_unkept(error.problem)
+            self._store = None
 
     def _shared(self, missing: Sequence[Trial], store: Store) -> Iterator[tuple[Trial, xr.Dataset]]:
         with store.claims() as claims:

@@ -84,7 +84,11 @@ class Store:
         except OutputError as error:
             if error.source is None:  # the record is faulty
                 raise
-            self._tell_once(f"{self.folder}: trials run but are not kept: {error.problem}")
+            self.tell_unkept(error.problem)
+
+    def tell_unkept(self, why: str) -> None:
+        """Say once why trials are not kept."""
+        self._tell_once(f"{self.folder}: trials run but are not kept: {why}")
 
     @contextmanager
     def claims(self) -> Iterator[Claims]:

@@ -1,4 +1,5 @@
 import json
+import os
 from functools import cache
 
 import numpy as np
@@ -77,6 +78,18 @@ def test_a_series_of_ones_own_is_fitted_as_well(tmp_path, monkeypatch):
         kept.append(len(list((tmp_path / "kept").iterdir())))
     # What came of one series is not taken for another's.
     assert kept == [1, 2, 3]
+
+
+def test_evaluations_that_a_full_disk_does_not_keep_count_all_the_same(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(twin, "base_series", lambda robot, data: series_by_law())
+    monkeypatch.setattr(os, "replace", lambda *_: os.stat(tmp_path / "nowhere"))
+    folder = tmp_path / "kept"
+    for parts in (np.full(len(FITTED.paths), part) for part in (0.4, 0.6)):
+        fit = twin.evaluate(ROBOT, parts, DATA, folder)
+        np.testing.assert_array_equal(fit.residuals, twin.evaluate(ROBOT, parts, DATA).residuals)
+    assert [each.getMessage() for each in caplog.records] == [
+        f"{folder}: evaluations are not kept: cannot be written (No such file or directory)"
+    ]
 
 
 @pytest.mark.parametrize(
