@@ -8,6 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from chilopod.cli import main
+from chilopod.cli.options import deliver
+from chilopod.errors import OutputError
+from chilopod.output import write_all
 from chilopod.robot import load_robot
 
 ROBOT = "aoi2022-planar"
@@ -121,6 +124,16 @@ def test_a_map_goes_on_without_its_growth_rates_and_every_file_is_kept_elsewhere
     assert err.splitlines()[-1].endswith(f"map.json: {FULL}; kept instead: {kept}")
     (said,) = [each.getMessage() for each in caplog.records if each.name == "chilopod.output"]
     assert said == f"there: growth rates are not kept: {FULL}"
+
+
+def test_files_that_could_be_written_are_named_too(capsys, full_there, monkeypatch):
+    without = os.replace
+    monkeypatch.setattr(os, "replace", lambda *to: (os.rename if to[1].suffix == ".svg" else without)(*to))
+    (full_there / "there").mkdir()
+    files = [(full_there / "there" / each, "1") for each in ("a.nc", "b.svg")]
+    with pytest.raises(OutputError, match="kept instead"):
+        deliver(lambda: write_all(files), lambda: print("the result"))
+    assert capsys.readouterr() == ("the result\n", f"wrote {files[1][0]}\n")
 
 
 def test_trials_that_a_full_disk_does_not_keep_are_printed_and_said_once(capsys, tmp_path, monkeypatch, caplog):

@@ -130,8 +130,12 @@ def test_what_is_kept_nowhere_is_named(tmp_path, monkeypatch, full_disk):
         real(source, target)
 
     monkeypatch.setattr(os, "replace", without_room_for_large_files)
-    with pytest.raises(OutputError, match=r"kept instead: .*/here/b\.nc; lost: .*/there/a\.nc, .*/there/c\.nc$"):
-        write_all([(there / "a.nc", "12"), (there / "b.nc", "1"), (there / "c.nc", "12")])
+    files = [(there / "a.nc", "12"), (there / "b.nc", "1"), (there / "c.nc", "12"), (here / "d.nc", "1")]
+    with pytest.raises(
+        OutputError, match=r"kept instead: .*/here/b\.nc; lost: .*/there/a\.nc, .*/there/c\.nc$"
+    ) as lost:
+        write_all(files)
+    assert lost.value.written == [here / "d.nc"]
 
 
 def test_a_file_of_progress_stops_nothing_and_is_missed_once(tmp_path, monkeypatch, full_disk, caplog):

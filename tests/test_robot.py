@@ -283,6 +283,15 @@ def test_values_and_their_range_have_one_unit(robot, path, value, said):
     assert str(caught.value).startswith(f"{path} = {said}")
 
 
+@pytest.mark.parametrize("given", [1e10, "1e10"])
+def test_a_number_without_a_unit_is_said_to_be_si(robot, given):
+    limits = r"allowed: 1\.74533e-11 N\*mm/deg to 1\.74533e\+10 N\*mm/deg"  # more than the number that is refused
+    with pytest.raises(ParameterError, match=f"{limits}; a number without a unit is in N\\*m/rad$"):
+        robot.override("springs.stiffness[0]", given)
+    with pytest.raises(ParameterError, match=f"'1e11 N\\*mm/deg': out of range; {limits}$"):
+        robot.override("springs.stiffness[0]", "1e11 N*mm/deg")
+
+
 def test_limits_of_a_spring_are_said_in_the_unit_of_robot_files(robot):
     with pytest.raises(
         ParameterError, match=r"= '20 N\*mm/deg': softest .* at joint 1; allowed: at most 10 N\*mm/deg$"

@@ -67,7 +67,9 @@ class ParameterError(ChilopodError, ValueError):
 
 
 class OutputError(ChilopodError, OSError):
-    """A result cannot be written where it should go."""
+    """A result cannot be written where it should go; ``written`` are paths of its files that could be."""
+
+    written: Collection[object] = ()
 
 
 class AnalysisError(ChilopodError, RuntimeError):

@@ -133,7 +133,9 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
         return written
     where = f"kept instead: {', '.join(map(str, kept))}" if kept else "no other place could be written"
     where += f"; lost: {', '.join(map(str, lost))}" if kept and lost else ""
-    raise OutputError(f"{failure.problem}; {where}", source=failure.source)
+    failure = OutputError(f"{failure.problem}; {where}", source=failure.source)
+    failure.written = written
+    raise failure
 
 
 def keep(path: Path, content: Content, what: str) -> None:

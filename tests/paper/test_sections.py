@@ -13,6 +13,7 @@ import pytest
 from chilopod.errors import ParameterError
 from chilopod.paper import ahead, duration
 from chilopod.paper.ahead import Studio, walked_ahead
+from chilopod.paper.measures import kept
 from chilopod.paper.registry import REGISTRY, chosen, load_sections
 from chilopod.paper.robot.sections import FILMS
 from chilopod.paper.section import Context, Found, Section, Size, reproduce
@@ -124,6 +125,21 @@ def test_a_section_sees_what_it_needs_where_that_was_computed():
     two = Section("two", "chapter", "two", lambda context, report, one: (one or 0) + 1, needs=(ONE,))
     assert reproduce([ONE, two])[two] == 2
     assert reproduce([two])[two] == 1
+
+
+def test_numbers_that_a_full_disk_does_not_keep_are_given_all_the_same(tmp_path, monkeypatch, caplog):
+    context, calls = Context(), []
+
+    def again():
+        return kept(tmp_path / "trials", context.whole, "how", lambda: calls.append(1) or [2.5])
+
+    with monkeypatch.context() as full:
+        full.setattr(os, "replace", lambda *_: os.stat(tmp_path / "nowhere"))
+        assert [again(), again()] == [[2.5], [2.5]]
+    assert [each.getMessage() for each in caplog.records] == [
+        f"{tmp_path / 'multipliers'}: multipliers are not kept: cannot be written (No such file or directory)"
+    ]
+    assert [again(), again(), len(calls)] == [[2.5], [2.5], 3]
 
 
 def test_one_that_fails_leaves_the_others_alone():

@@ -115,7 +115,7 @@ def test_a_later_study_that_lacks_room_is_given_all_the_same(tmp_path, monkeypat
     assert [record.attrs["trial"] for record in records] == [trial.text for trial in TRIALS[:2]]
     assert files(tmp_path) == NAMES[:1]
     (said,) = [each.getMessage() for each in caplog.records if each.name == "chilopod.trials.store"]
-    assert said.startswith(f"{tmp_path}: trials run but are not kept: takes ")
+    assert said == f"{tmp_path}: trials run but are not kept: there is no room"
 
 
 def test_where_there_are_no_locks_nobody_shares(tmp_path, monkeypatch):

@@ -211,10 +211,11 @@ def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> No
     """Write the files of a result, name them on stderr, and print the result, also where a file cannot be written."""
     failure = None
     try:
-        for path in write():
-            typer.echo(f"wrote {path}", err=True)
+        written: Iterable[object] = write()
     except OutputError as error:
-        failure = error
+        failure, written = error, error.written
+    for path in written:
+        typer.echo(f"wrote {path}", err=True)
     try:
         show()
     finally:

@@ -130,10 +130,10 @@ class _Study:
         try:
             check_room(store.folder, needed)
             _used.add(store.folder)
-        except OutputError as error:
+        except OutputError:
             if store.folder not in _used:
                 raise
-            store.tell_unkept(error.problem)
+            store.tell_unkept("there is no room")
             self._store = None
 
     def _shared(self, missing: Sequence[Trial], store: Store) -> Iterator[tuple[Trial, xr.Dataset]]:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationErro
 from pydantic_core import CoreSchema, core_schema
 
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
-from chilopod.units.expressions import format, kind_of, parse
+from chilopod.units.expressions import format, kind_of, parse, unit_in
 
 # Far outside anything that walks, and far inside what products and quotients of a few quantities need to stay finite.
 _SMALLEST: Final = 1e-12
@@ -81,6 +81,8 @@ class Quantity:
             problem = "must be a whole number"
         else:
             problem = "out of range"
+        if given is not None and self.display != self.si and not (isinstance(given, str) and unit_in(given)):
+            allowed += f"; a number without a unit is in {self.si}"
         raise ParameterError(problem, value=shown, allowed=allowed)
 
     def read(self, value: object) -> float:

@@ -1,6 +1,8 @@
 """A page that is there at once and whole at any time, whatever happens while it fills in."""
 
+import errno
 import json
+import os
 import re
 import shutil
 import threading
@@ -197,6 +199,22 @@ def test_what_fails_is_said_and_the_others_are_there(monkeypatch, capsys, tmp_pa
     assert RUNNING not in html
     assert main(["--debug", "reproduce", "--out", str(tmp_path), "--json"]) == 1
     assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_figure_that_cannot_be_written_is_no_fault_of_ours(monkeypatch, capsys, tmp_path):
+    real = os.replace
+
+    def full(source, target):
+        if "one.csv" in str(target):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    monkeypatch.setattr(registry, "load_sections", lambda: (replace(ONE, rows=lambda value: ()), TWO))
+    assert main(["reproduce", "--out", str(tmp_path), "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert err.splitlines()[-1].endswith("one.csv: cannot be written (No space left on device)")
+    assert json.loads(out)["rows"]
 
 
 def test_a_figure_that_cannot_be_drawn_is_no_secret(tmp_path):
