@@ -77,7 +77,7 @@ _UNRAISED = re.compile(r"^Exception ignored [^\n]*\n(?:[^\n]*\n)*?KeyboardInterr
 _SAID = re.compile(
     r"^(?:[^:]+: +\d+ (?:%|s|min|h).*|The page is .*|no browser could be started: open .*|"
     r"note: .*|wrote .*|kept .*|the controller took .*|"
-    r".*: walked again; .*|.*: its trials walk and are not kept: .*|[^:]+: compiling, once on this machine|"
+    r".*: walked again; .*|.*: [a-z ]+ are not kept: .*|[^:]+: compiling, once on this machine|"
     r"Invalid -W option ignored: .*|)$"  # Python says this of PYTHONWARNINGS before anything of ours runs
 )
 _FIELD = re.compile(

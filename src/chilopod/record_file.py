@@ -78,7 +78,7 @@ class RecordFile:
         except OutputError as error:
             try:
                 self._spooled = spool(Path.cwd() / self._path.name, size)  # where the file itself is kept then
-            except OutputError:
+            except OSError:  # or it was deleted
                 self._failure = error
                 return
         self._medium = _Medium(self._spooled.fileno(), "r+b", closefd=False)
