@@ -30,17 +30,14 @@ _STEP = 1e-6  # of differences, in parts of ranges
 
 @dataclass(frozen=True)
 class Constant:
-    """Free constant: its path and the ends of its range, SI, with ``per`` that of its ratio to an earlier constant."""
+    """Free constant: its path and the ends of its range, SI, with ``per`` that of its ratio to an earlier constant. The
+    parts of the range are even in the constant, or in its logarithm."""
 
     path: str
     low: float
     high: float
     per: str | None = None
-
-    @property
-    def logarithmic(self) -> bool:
-        """True if the parts of the range are even in the logarithm: the range is wide and positive."""
-        return 0.0 < _LOGARITHMIC * self.low <= self.high
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,6 +93,12 @@ class FreeConstants:
         moves = _STEP * np.eye(len(parts))
         return np.array([self.values_at(parts + move) - self.values_at(parts - move) for move in moves]).T / (2 * _STEP)
 
+    def ends(self, parts: Array, half: Array) -> Array:
+        """Values of each constant at the ends of an interval of its part alone, which its range may cut, shape
+        (constants, 2)."""
+        moved = (np.clip(parts + side * np.diag(half), 0.0, 1.0) for side in (-1.0, 1.0))
+        return np.array([[self.values_at(row)[at] for at, row in enumerate(rows)] for rows in moved]).T
+
     def limits(self, values: Array) -> Array:
         """Ends of the range of each constant where the others have their values, shape (constants, 2)."""
         ends = np.array([(each.low, each.high) for each in self.each])
@@ -146,7 +149,7 @@ def _constant(name: str, ends: object, before: Sequence[str]) -> Constant:
     low, high = (units.parse(end, unit) if slash else quantity.read(end) for end in ends)
     if not low < high or (slash and low <= 0.0):
         raise ParameterError("must be a rising range", value=ends)
-    return Constant(path, low, high, per if slash else None)
+    return Constant(path, low, high, per if slash else None, 0.0 < _LOGARITHMIC * low <= high)
 
 
 @dataclass(frozen=True)
@@ -189,15 +192,16 @@ class Estimates:
         if np.isfinite(self.spread).all():
             found["correlations"] = (self.spread / np.maximum(np.outer(half, half), 1e-300)).tolist()
             widths = np.ptp(self.free.limits(self.values), axis=1)
-            linear = np.array([not each.logarithmic for each in self.free.each])
-            zero = linear & (np.abs(self.values) < _ZERO * widths)
+            signed = np.array([each.low <= 0.0 for each in self.free.each])
+            zero = signed & (np.abs(self.values) < _ZERO * widths)
             found["of_range"] = [path for path, is_zero in zip(paths, zero, strict=True) if is_zero]
             scale = np.where(zero, widths, np.abs(self.values))
             squares, directions = np.linalg.eigh(self.spread / np.outer(scale, scale))
+            slopes = self.free.slopes(self.free.parts_of(self.values))
             signs = np.where(directions.sum(axis=0) < 0.0, -1.0, 1.0)
             for change in (signs * np.sqrt(np.abs(squares)) * directions).T:
                 changes = dict(zip(paths, change.tolist(), strict=True))
-                is_open = bool((np.abs(change) * scale > _OPEN * widths).any())
+                is_open = bool(np.linalg.norm(np.linalg.solve(slopes, change * scale)) > _OPEN)
                 found["combinations"].append({"changes": changes, "open": is_open})
         return found
 
@@ -210,21 +214,22 @@ class Estimates:
 
     def between(self, at: int, ends: Array, cut: Array) -> str:
         """Range of a constant in words, and whether the data or the search end it; nothing if it is NaN."""
-        low, high = limits = self.free.limits(self.values)[at]
         if not np.isfinite(ends).all():
             return ""
-        cut = cut | (np.abs(ends - limits) <= _AT * (high - low))
+        places = np.where(np.arange(len(self.values)) == at, [[ends[0]], [ends[1]], [self.values[at]]], self.values)
+        low, high, best = (float(self.free.parts_of(place)[at]) for place in places)
+        cut = cut | (np.abs([low, high - 1.0]) <= _AT)
         which = "" if cut.all() else "lower end " if cut[0] else "upper end "
         remark = f" ({which}cut by the range searched)" if cut.any() else ""
         # At the end of a range the data ask for values beyond it.
-        inside = min(self.values[at] - low, high - self.values[at]) > _AT * (high - low)
-        remark = " (left open by the data)" if inside and np.ptp(ends) > 2.0 * _OPEN * (high - low) else remark
+        inside = min(best, 1.0 - best) > _AT
+        remark = " (left open by the data)" if inside and high - low > 2.0 * _OPEN else remark
         return " to ".join(self._text(at, end, ends) for end in ends.tolist()) + remark
 
     def _text(self, at: int, value: float, ends: Array) -> str:
         """A value of a constant, with two digits of half of a range."""
         half = 0.5 * float(np.ptp(ends)) or np.nan
-        value = 0.0 if abs(value) < _HIDDEN * half and not self.free.each[at].logarithmic else value
+        value = 0.0 if abs(value) < _HIDDEN * half and self.free.each[at].low <= 0.0 else value
         digits = 2 + int(np.clip(np.ceil(np.log10(abs(value) / half)), 0, 6)) if value and np.isfinite(half) else 4
         return units.format(value, self.given.unit_of(self.free.paths[at]), digits)
 

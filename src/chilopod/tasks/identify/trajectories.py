@@ -102,8 +102,7 @@ def identify_recorded(
     wide = float(stdtrit(max(off.size / factor - unknown.size, 1.0), 0.5 + 0.5 * CONFIDENCE))
     values, slopes = data.free.values_at(unknown[:count]), data.free.slopes(unknown[:count])
     spread = wide**2 * factor * error**2 * slopes @ walks.covariance(unknown, error) @ slopes.T
-    half = np.sqrt(np.diag(spread))
-    ends = np.clip(np.array([values - half, values + half]), *data.free.limits(values).T[:, None]).T
+    ends = data.free.ends(unknown[:count], np.sqrt(np.diag(spread)) / np.diag(slopes))
     times = np.concatenate([each.times for each in walks.recordings])
     number = np.repeat(range(len(measured)), [len(each) for each in measured])
     record = xr.Dataset(coords={"time": ("sample", times, {"units": "s"}), "walk": ("sample", number)})
