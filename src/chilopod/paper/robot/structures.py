@@ -40,6 +40,7 @@ TOLERANCE = 0.05
 """Tolerance of a printed onset, relative: half of the report's; unit of the residuals in chi squared."""
 
 _STEP = 0.06  # of a constant's range, for differences: where walks change evenly
+_LOST = 30.0  # residual of a walk that fails
 _ROUNDS, _MET = 5, 0.7  # steps at most, and misfit at which that ends
 
 _SPRINGS = {"pitchfork": (17.0, 21.0, 26.0), "hopf": (8.7, 11.0, 15.0)}  # N*mm/deg, where criteria are smallest
@@ -209,7 +210,9 @@ def _law(robot: Robot, data: BaseSeries, progress: Progress) -> Array:
 def _off(robot: Robot, data: BaseSeries, engine: str = "twin", duration: float = DURATION) -> Array:
     """Residuals that are not zero wherever they are met."""
     smooth = len(data.radii) + len(data.speeds) + 1
-    return residuals(robot, base_series(robot, data, engine=engine, duration=duration), data)[:smooth]
+    series = base_series(robot, data, engine=engine, duration=duration)
+    off = residuals(robot, series, data, by_curvature=True)[:smooth]
+    return np.where(off == np.inf, _LOST, off)
 
 
 def _fitted(

@@ -15,7 +15,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,7 +35,7 @@ from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.constants import CONFIDENCE, Estimates, FreeConstants, Identified
 from chilopod.tasks.identify.data import FITTED, BaseSeries
-from chilopod.tasks.identify.twin_series import DURATION, LOST, Series, base_series, residuals
+from chilopod.tasks.identify.twin_series import DURATION, FAR, LOST, Series, base_series, residuals
 from chilopod.tasks.identify.valley import LEAST, Samples, Surrogate
 from chilopod.tasks.radius_law import CYCLES, SAMPLES, end_of_walk
 from chilopod.trials import Trial, run
@@ -49,9 +49,6 @@ VERSION = 3
 GOOD = 1.0
 """Largest residual of a good set of constants: each datum is then within its standard error."""
 
-FAR = 3.0
-"""Largest residual of the nearest fit beyond which the data have no valley: no constants explain them."""
-
 PRIOR = 0.25
 """Standard deviation of a constant about the middle of its range, in parts of the range, in the choice of the best."""
 
@@ -62,11 +59,13 @@ _MOST_CONFIRMED = 20
 
 @dataclass(frozen=True)
 class Fit:
-    """One set of constants, in parts of their ranges, its residuals, and its weight in the valley, 0 if not in it."""
+    """One set of constants, in parts of their ranges, its residuals, its weight in the valley, 0 if not in it, and its
+    residuals with those of curvatures in place of radii, whose squares make the likelihood."""
 
     parts: Array
     residuals: Array
     weight: float = 0.0
+    by_curvature: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def largest(self) -> float:
@@ -113,7 +112,8 @@ class TwinIdentification(Identified):
         if samples.effective <= count:  # so few span no region
             return Estimates(self.given, free, best, np.full((count, 2), np.nan), np.full((count, count), np.nan))
         values = np.array([free.values_at(parts) for parts in samples.parts]).T
-        off = values - (values @ samples.weights)[:, None]
+        # Of parts of ranges, in which the samples may fill a range evenly; values of many decades have no such spread.
+        off = free.slopes(self.fits[0].parts) @ (samples.parts - samples.weights @ samples.parts).T
         spread = norm.ppf(0.5 + 0.5 * CONFIDENCE) ** 2 * (samples.weights * off) @ off.T
         return Estimates(self.given, free, best, np.array([samples.interval(each) for each in values]), spread)
 
@@ -138,7 +138,7 @@ class TwinIdentification(Identified):
 
     def _remarks(self) -> list[str]:
         samples = self.samples
-        if not len(samples.weights):
+        if self.nearest.largest > FAR:
             return ["no valley: no constants come within three standard errors of every datum"]
         said = f"valley: {samples.effective:.3g} effective samples of {len(samples.weights)}; squared errors of the "
         said += f"surrogate there are {self.misjudged:.2g} times those that it expected"
@@ -176,7 +176,8 @@ def samples_of(fits: Sequence[Fit]) -> Samples:
 def evaluate(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None = None) -> Fit:
     """Residuals of a set of constants, in parts of their ranges."""
     given, found = walked(robot, parts, data, folder)
-    return Fit(parts, residuals(given, found, data))
+    of_radii, of_curvatures = (residuals(given, found, data, by_curvature) for by_curvature in (False, True))
+    return Fit(parts, of_radii, by_curvature=of_curvatures)
 
 
 def walked(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None = None) -> tuple[Robot, Series]:
@@ -264,16 +265,17 @@ def search(
         surrogate = Surrogate(*_walked(fits), excess)
     found = evaluated(surrogate.draws(counts[1], rng))
     heights = surrogate.log_likelihood(np.array([fit.parts for fit in found]))
-    logs = -0.5 * np.array([np.sum(fit.residuals**2) for fit in found]) - heights
-    weights = np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum()
+    logs = -0.5 * np.array([np.sum(fit.by_curvature**2) for fit in found]) - heights
+    weights = np.exp(logs - max(logs.max(), -np.finfo(float).max))  # all zero if no sample walks
+    weights /= max(weights.sum(), 1.0)
     fits += [replace(fit, weight=weight) for fit, weight in zip(found, weights.tolist(), strict=True)]
     return fits, surrogate.misjudged(*_walked(found))
 
 
 def _walked(fits: Sequence[Fit]) -> tuple[Array, Array]:
-    """Constants with which the robot walks, in parts of their ranges, and residuals."""
+    """Constants with which the robot walks, in parts of their ranges, and residuals as in the likelihood."""
     walked = [fit for fit in fits if fit.largest < LOST]
-    return np.array([fit.parts for fit in walked]), np.array([fit.residuals for fit in walked])
+    return np.array([fit.parts for fit in walked]), np.array([fit.by_curvature for fit in walked])
 
 
 def identify_twin(

@@ -21,13 +21,17 @@ from chilopod.twin.walk import TOLERANCE
 DURATION = 60.0
 """Duration of the walks, s."""
 
-LOST = 30.0
+LOST = np.inf
 """Value of every residual for constants with which the robot cannot walk."""
+
+FAR = 3.0
+"""Largest residual of the nearest fit beyond which the data have no valley: no constants explain them."""
 
 _SOONER = 36.0  # s, when walks that are far off are given up
 _HOPELESS = 4.0  # misfit
 _AVERAGED = 4.8  # s, whole periods near the paper's 5 s
 _APART = 12.0  # s between the two last averages, a cycle of the slowest swing
+_STRAIGHT = 0.1  # rad in all
 _STEADY = 0.1  # rad that the summed bend may move between them
 _PER_CYCLE = 10  # samples
 
@@ -62,7 +66,7 @@ def base_series(
     if springs is None:
         walk.advance(min(_SOONER, duration))
         early = _series(walk, robot)
-        if np.sqrt(np.mean(residuals(robot, early, data) ** 2)) > _HOPELESS:
+        if np.sqrt(np.mean(residuals(robot, early, data, by_curvature=True) ** 2)) > _HOPELESS:
             return early
     walk.advance(duration)
     return _series(walk, robot)
@@ -79,18 +83,22 @@ def _series(walk: Walk, robot: Robot) -> Series:
     return Series(before.mean(0), angles[-samples:].mean(0), steps.mean(0) / robot.gait.period)
 
 
-def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
+def residuals(robot: Robot, found: Series, data: BaseSeries, by_curvature: bool = False) -> Array:
     """Residuals of a series: computed less the data, one number for each of ``data.names``. These are radii, speeds and
     onset (each over its standard error); bend where the robot is straight beyond 0.1 rad in all (over 0.05 rad); the
-    deficit from 0.3 rad at the stiffest curved spring (the same); motion between averages beyond 0.1 rad (over 0.1)."""
+    deficit from 0.3 rad at the stiffest curved spring (the same); motion between averages beyond 0.1 rad (over 0.1).
+    The radius of a straight walk is that of a bend by 0.1 rad, or of three standard errors if that is larger. With
+    ``by_curvature`` a radius R has the error of 1/R to first order and keeps its sign, as in the likelihood."""
     springs = data.springs
     summed = np.abs(found.bends).sum(-1)
     at = dict(zip(springs, summed, strict=True))
     if not np.isfinite(found.bends).all():
         return np.full(len(data.names), LOST)
     length = (robot.body.modules - 1) * robot.module_length
-    # Of curvatures, which are finite where a walk is straight.
-    off = [(at[k] * r / length - 1.0) * r / error for k, (r, error) in data.radii.items()]
+    off = [(1.0 - at[k] * r / length) * r / error for k, (r, error) in data.radii.items()]
+    if not by_curvature:
+        least = {k: min(_STRAIGHT, length / (r + FAR * error)) for k, (r, error) in data.radii.items()}
+        off = [(length / max(at[k], least[k]) - r) / error for k, (r, error) in data.radii.items()]
     off += [(found.speeds[springs.index(k)] - v) / error for k, (v, error) in data.speeds.items()]
     curved = [springs.index(k) for k in data.curved]
     try:
@@ -98,7 +106,7 @@ def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
     except AnalysisError:
         fitted = 0.5 * data.onset[0]
     off.append((fitted - data.onset[0]) / data.onset[1])
-    off += [max(at[k] - 0.1, 0.0) / 0.05 for k in data.straight]
+    off += [max(at[k] - _STRAIGHT, 0.0) / 0.05 for k in data.straight]
     off.append(max(0.3 - at[max(data.curved)], 0.0) / 0.05)
     moved = np.abs(np.abs(found.bends).sum(-1) - np.abs(found.before).sum(-1))
     off.append(max(float(moved.max()) - _STEADY, 0.0) / _STEADY)
