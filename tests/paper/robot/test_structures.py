@@ -4,11 +4,13 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.engine import engine_named
+from chilopod.paper.printed import base_series_data
 from chilopod.paper.robot import structures
 from chilopod.paper.robot.figures import trust
 from chilopod.paper.robot.spread import LOWER
 from chilopod.paper.robot.structures import STRUCTURES
 from chilopod.tasks.identify.data import FITTED
+from chilopod.tasks.identify.twin_series import Series
 
 ROBOT = load_robot("aoi2022")
 STRIDE = "stride 1.8 cm"
@@ -49,6 +51,14 @@ def test_constants_are_moved_until_the_series_is_met_again(monkeypatch):
     assert fitted < 1.0
     assert np.abs(FITTED.parts_of(FITTED.of(robot)) - start).max() < 0.4  # by the shortest way
     assert structures._fitted(ROBOT, None, measured, "twin", 5, 60.0)[0] == 0.0
+
+
+def test_a_structure_that_falls_is_far_off(monkeypatch):
+    data = base_series_data()
+    bends = np.full((len(data.springs), 5), 0.225 / 1.1)
+    bends[1] = np.nan
+    monkeypatch.setattr(structures, "base_series", lambda *_, **__: Series(bends, bends, bends[:, 0]))
+    np.testing.assert_array_equal(structures._off(ROBOT, data), np.full(4, 30.0))
 
 
 def made_up(predicted):

@@ -4,12 +4,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.stats.qmc import LatinHypercube
 
 from chilopod import load_robot
 from chilopod.analysis.parameters import stiffness
 from chilopod.errors import ChilopodError
 from chilopod.paper.printed import base_series_data
 from chilopod.tasks.identify import TEMPLATES, BaseSeries, load_data, twin, twin_series
+from chilopod.tasks.identify.constants import FreeConstants
 from chilopod.tasks.identify.twin import FITTED, TwinIdentification, known, search
 from chilopod.tasks.identify.twin_series import Series, base_series, residuals
 from chilopod.tasks.identify.valley import Samples, Surrogate
@@ -147,6 +149,46 @@ def test_every_datum_counts():
     assert (residuals(ROBOT, lost, DATA) > 10.0).all()
 
 
+@pytest.mark.parametrize(("radius", "error"), [(0.88, 0.044), (0.8, 0.4), (2.5, 1.2), (1386.0, 69.0)])
+def test_a_radius_is_missed_by_what_it_is_off(radius, error):
+    """With errors of half the radius 1/radius says otherwise: 1.344 m is 1.36 errors above 0.8 +- 0.4 m, not 0.81."""
+    data = DATA.model_copy(update={"radii": {stiffness(21.0): (radius, error)}})
+    length = 5 * 0.225
+    for computed in (1.344, 0.5 * radius, radius - error, radius, radius + error, radius + 2.9 * error):
+        bends = np.full((len(data.springs), 5), 0.2 * length / computed)
+        series = Series(bends, bends, np.full(len(bends), 0.056))
+        found = residuals(ROBOT, series, data)[0]
+        assert found == pytest.approx((computed - radius) / error, rel=1e-9, abs=1e-9)
+        by_curvature = residuals(ROBOT, series, data, by_curvature=True)
+        assert by_curvature[0] == pytest.approx((1.0 / radius - 1.0 / computed) / (error / radius**2), abs=1e-9)
+    straight = residuals(ROBOT, Series(0.0 * bends, 0.0 * bends, series.speeds), data)
+    assert 3.0 <= straight[0] < np.inf
+    assert straight[0] == pytest.approx(max(length / 0.1 - radius, 3.0 * error) / error)
+    np.testing.assert_array_equal(residuals(ROBOT, series, data)[1:], by_curvature[1:])
+
+
+def test_weights_are_those_of_curvatures(monkeypatch):
+    """Of two samples that are alike but for a radius: one is exact, one 0.9 errors too small, with 50 % for an error.
+    Its 1/radius has 1.64 errors of 50 %."""
+    data = scattered_data(np.full(4, 0.5), np.random.default_rng(0))
+    data = data.model_copy(update={"radii": {stiffness(26.0): (1.0, 0.5)}})
+    radii = iter([1.0, 1.0, 0.55, 1.0])
+
+    def series(robot, data):
+        found = stand_in_series(data.free.robot_with(ROBOT, data.free.values_at(np.full(4, 0.5))), data)
+        found.bends[data.springs.index(stiffness(26.0))] = 0.225 / next(radii)
+        return Series(found.bends, found.bends, found.speeds)
+
+    def inside(surrogate, parts):
+        return np.where(((parts >= 0.0) & (parts <= 1.0)).all(axis=1), 0.0, -np.inf)
+
+    monkeypatch.setattr(twin, "base_series", series)
+    monkeypatch.setattr(Surrogate, "log_likelihood", inside)
+    fits, _ = search(ROBOT, data, [], (2, 2))
+    assert [fit.residuals[0] for fit in fits] == pytest.approx([0.0, 0.0, -0.9, 0.0])
+    assert fits[2].weight / fits[3].weight == pytest.approx(np.exp(-0.5 * ((1.0 - 1.0 / 0.55) / 0.5) ** 2))
+
+
 def test_constants_go_in_and_come_out():
     parts = np.linspace(0.1, 0.9, len(FITTED.paths))
     values = FITTED.values_at(parts)
@@ -176,6 +218,14 @@ OPEN = {
     "legs.half_width": [0.05, 0.10],
     "twin.sliding_friction": [0.3, 1.0],
     "springs.damping": [0.005, 0.1],
+}
+
+
+# Three ranges of two decades each.
+ALIKE = {
+    "springs.damping": [0.001, 0.1],
+    "twin.clearance": [0.0005, 0.05],
+    "twin.joint_inertia": [0.0001, 0.01],
 }
 
 
@@ -226,6 +276,77 @@ def test_a_search_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
     for one, other in zip(whole, again, strict=True):
         np.testing.assert_array_equal(one.parts, other.parts)
         assert one.weight == other.weight
+
+
+@pytest.mark.parametrize(
+    ("update", "said"),
+    [
+        (
+            {"speeds": {stiffness(21.0): (0.056, 1e-6)}},
+            f"misses the speed at 21 by {(0.016 - 0.018 * np.exp(-0.4)) / 1e-6:.2f} standard errors",
+        ),
+        ({"radii": {stiffness(21.0): (1386.0, 69.0)}}, "misses the radius at 21 by 20.07 standard errors"),
+    ],
+)
+def test_walks_far_from_the_data_are_walks(monkeypatch, update, said):
+    """A speed with a tiny error, and a radius in mm that is called one in m, where all walk as these constants."""
+    data = scattered_data(np.full(4, 0.4), np.random.default_rng(0)).model_copy(update=update)
+    series = stand_in_series(data.free.robot_with(ROBOT, data.free.values_at(np.full(4, 0.4))), data)
+    monkeypatch.setattr(twin, "base_series", lambda *_: series)
+    found = twin.identify_twin(ROBOT, data, evaluations=3, samples=2)
+    assert said in found.lines()[0]
+    assert "no valley" in found.lines()[-1]
+    assert {each["interval_text"] for each in found.as_json()["constants"].values()} == {"none found"}
+    json.dumps(found.as_json(), allow_nan=False)
+
+
+@pytest.mark.parametrize("falls", [range(1, 4), range(40, 50), range(50, 60), range(60)])
+def test_sets_of_constants_with_which_a_robot_falls_have_no_weight(monkeypatch, falls):
+    """Some of the first, those of a round, all samples, or all."""
+    data, asked = scattered_data(np.full(4, 0.4), np.random.default_rng(0)), []
+
+    def series(robot, data):
+        asked.append(robot)
+        found = stand_in_series(robot, data)
+        found.bends[2] *= np.nan if len(asked) - 1 in falls else 1.0
+        return found
+
+    monkeypatch.setattr(twin, "base_series", series)
+    if len(falls) == 60:
+        with pytest.raises(ChilopodError, match="robot: must walk with some constants in their ranges"):
+            search(ROBOT, data, [], (50, 10))
+        return
+    found = TwinIdentification(ROBOT, data, *search(ROBOT, data, [], (50, 10)))
+    assert [np.isinf(fit.largest) for fit in found.fits] == [at in falls for at in range(60)]
+    assert np.isfinite(found.misjudged)
+    assert sum(fit.weight for fit in found.fits) == pytest.approx(0.0 if 50 in falls else 1.0)
+    assert not any(fit.weight for fit in found.fits if np.isinf(fit.largest))
+    json.dumps(found.as_json(), allow_nan=False)
+    # Trained sets meet the data, so there is a valley, of which no sample is known.
+    assert ("valley: 0 effective samples of 0" in found.lines()[-1]) == (50 in falls)
+
+
+@pytest.mark.parametrize("free", [FITTED, FreeConstants.read(ALIKE)], ids=["fitted", "alike"])
+def test_samples_that_fill_their_ranges_leave_every_constant_open(free):
+    """Whichever scale a range has, and wherever the best is: samples are even in parts of the ranges."""
+    data = DATA.model_copy(update={"free": free})
+    parts = LatinHypercube(len(free.each), rng=np.random.default_rng(0)).random(400)
+    fits = [twin.Fit(each, np.zeros(len(data.names)), 1.0 / 400) for each in parts]
+    for best in (0, 1, 2):
+        found = TwinIdentification(ROBOT, data, [fits[best], *fits]).as_json()
+        for each in found["constants"].values():
+            assert each["interval_text"].endswith("(left open by the data)")
+        assert all(each["open"] for each in found["combinations"])
+    # In half of every range, which is 0.45 of it with 90 %, none is open.
+    halves = [twin.Fit(0.2 + 0.5 * fit.parts, fit.residuals, fit.weight) for fit in fits]
+    assert "open" not in str(TwinIdentification(ROBOT, data, halves))
+
+
+def test_ends_of_an_interval_are_even_in_what_is_searched():
+    free = FreeConstants.read({"springs.damping": (0.0005, 0.5), "twin.clearance": (0.003, 0.011)})
+    ends = free.ends(np.array([0.5, 0.5]), np.array([1.0 / 3.0, 0.25]))
+    np.testing.assert_allclose(ends, [[10.0**-2.8010299957, 10.0**-0.8010299957], [0.005, 0.009]], rtol=1e-9)
+    np.testing.assert_allclose(free.ends(np.array([0.1, 0.9]), np.ones(2)), [[0.0005, 0.5], [0.003, 0.011]])
 
 
 @cache
