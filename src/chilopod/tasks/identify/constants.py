@@ -218,7 +218,7 @@ class Estimates:
             return ""
         places = np.where(np.arange(len(self.values)) == at, [[ends[0]], [ends[1]], [self.values[at]]], self.values)
         low, high, best = (float(self.free.parts_of(place)[at]) for place in places)
-        cut = cut | (np.abs([low, high - 1.0]) <= _AT)
+        cut = np.logical_or(cut, np.abs([low, high - 1.0]) <= _AT)
         which = "" if cut.all() else "lower end " if cut[0] else "upper end "
         remark = f" ({which}cut by the range searched)" if cut.any() else ""
         # At the end of a range the data ask for values beyond it.
