@@ -1,5 +1,6 @@
 import json
 import os
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -298,6 +299,24 @@ def test_walks_far_from_the_data_are_walks(monkeypatch, update, said):
     assert "no valley" in found.lines()[-1]
     assert {each["interval_text"] for each in found.as_json()["constants"].values()} == {"none found"}
     json.dumps(found.as_json(), allow_nan=False)
+
+
+def test_walks_that_were_given_up_for_other_data_are_walked_again(tmp_path, monkeypatch):
+    """As those kept with a number in another unit, which is then corrected."""
+    data, asked = scattered_data(np.full(4, 0.4), np.random.default_rng(0)), []
+    wrong = data.model_copy(update={"radii": {stiffness(21.0): (880.0, 26.0)}, "law": (0.2, 0.5)})
+    right = data.model_copy(update={"law": (0.2, 0.5)})
+
+    def series(robot, data):
+        asked.append(data)
+        found = stand_in_series(robot, data)
+        return replace(found, early=True, speeds=1.1 * found.speeds) if data is wrong else found
+
+    monkeypatch.setattr(twin, "base_series", series)
+    for data, count in ((wrong, 1), (wrong, 1), (right, 2), (right, 2), (wrong, 2)):
+        fit = twin.evaluate(ROBOT, np.full(4, 0.4), data, tmp_path)
+        assert len(asked) == count
+    assert fit.residuals[1] == twin.evaluate(ROBOT, np.full(4, 0.4), right).residuals[1]
 
 
 @pytest.mark.parametrize("falls", [range(1, 4), range(40, 50), range(50, 60), range(60)])

@@ -15,7 +15,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,7 +35,7 @@ from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.constants import CONFIDENCE, Estimates, FreeConstants, Identified
 from chilopod.tasks.identify.data import FITTED, BaseSeries
-from chilopod.tasks.identify.twin_series import DURATION, FAR, LOST, Series, base_series, residuals
+from chilopod.tasks.identify.twin_series import DURATION, FAR, LOST, Series, base_series, hopeless, residuals
 from chilopod.tasks.identify.valley import LEAST, Samples, Surrogate
 from chilopod.tasks.radius_law import CYCLES, SAMPLES, end_of_walk
 from chilopod.trials import Trial, run
@@ -189,14 +189,17 @@ def walked(robot: Robot, parts: Array, data: BaseSeries, folder: Path | None = N
     path = (folder or Path()) / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
     with suppress(OSError, ValueError, KeyError):
         kept = json.loads(path.read_text()) if folder else {}
-        return given, Series(*(np.array(kept[each.name], dtype=np.float64) for each in fields(Series)))
+        before, bends, speeds = (np.array(kept[name], dtype=np.float64) for name in ("before", "bends", "speeds"))
+        found = Series(before, bends, speeds, early=kept["early"])
+        if not found.early or hopeless(given, found, data):  # not given up for other data, as a wrong number
+            return given, found
     try:
         found = base_series(given, data)
     except ChilopodError:  # legs too short, for example
         lost = np.full((len(data.springs), given.body.modules - 1), np.nan)
         found = Series(lost, lost, lost[:, 0])
     if folder:
-        kept = {name: each.tolist() for name, each in vars(found).items()}
+        kept = {name: np.asarray(each).tolist() for name, each in vars(found).items()}
         keep(path, json.dumps({"constants": constants.tolist(), **kept}), "evaluations")
     return given, found
 

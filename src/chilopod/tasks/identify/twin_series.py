@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,11 +40,12 @@ _PER_CYCLE = 10  # samples
 class Series:
     """Measures of the walks of a series, NaN where a walk failed: mean joint angles over 4.8 s, 12 s before the end and
     at the end, rad, shape (springs, joints), and speeds of module 1 along its way, gait cycle by gait cycle, over the
-    last 4.8 s, m/s, shape (springs,)."""
+    last 4.8 s, m/s, shape (springs,). ``early`` says that the walks were given up, as they were far off the data."""
 
     before: Array
     bends: Array
     speeds: Array
+    early: bool = False
 
 
 def base_series(
@@ -66,8 +67,8 @@ def base_series(
     if springs is None:
         walk.advance(min(_SOONER, duration))
         early = _series(walk, robot)
-        if np.sqrt(np.mean(residuals(robot, early, data, by_curvature=True) ** 2)) > _HOPELESS:
-            return early
+        if hopeless(robot, early, data):
+            return replace(early, early=True)
     walk.advance(duration)
     return _series(walk, robot)
 
@@ -81,6 +82,11 @@ def _series(walk: Walk, robot: Robot) -> Series:
     steps = np.linalg.norm(np.diff(places, axis=0), axis=-1)
     before = angles[: len(angles) - apart][-samples:]
     return Series(before.mean(0), angles[-samples:].mean(0), steps.mean(0) / robot.gait.period)
+
+
+def hopeless(robot: Robot, found: Series, data: BaseSeries) -> bool:
+    """True if walks are so far off the data that they are given up early."""
+    return bool(np.sqrt(np.mean(residuals(robot, found, data, by_curvature=True) ** 2)) > _HOPELESS)
 
 
 def residuals(robot: Robot, found: Series, data: BaseSeries, by_curvature: bool = False) -> Array:
