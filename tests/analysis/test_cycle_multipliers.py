@@ -47,6 +47,43 @@ def test_a_cart_and_a_spring_have_the_multipliers_of_their_steps(amplitude):
     assert found.mismatch < 1e-11
 
 
+@pytest.mark.parametrize(("damping", "begun"), [(20.0, 2.5), (500.0, 2.0)])
+def test_the_motion_is_the_one_that_the_start_settles_into(damping, begun):
+    """A pendulum in oil sinks from near the top and hangs; standing on its top it repeats too."""
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.002"/><worldbody><body><joint name="q" axis="0 1 0" damping="{damping}"/>
+        <geom size="0.05" pos="0 0 -0.5" mass="1"/></body></worldbody>
+        <actuator><motor joint="q"/></actuator></mujoco>"""
+    )
+    cycle = CycleMap(model, 0.5 * np.sin(2.0 * np.pi * np.arange(100) / 100)[:, None])
+    found = cycle_multipliers("pendulum", cycle, np.array([begun, 0.0]), ["q"])
+    assert found.stable is True
+    assert abs(found.state[0]) < 1e-2
+    # Overdamped, c q' = -m g l q over the period.
+    assert found.exact[0].multiplier.real == pytest.approx(np.exp(-9.81 * 0.5 * 0.2 / damping), abs=5e-4)
+
+
+def test_a_mode_that_dies_out_at_once_does_not_hide_the_others():
+    """A pendulum on a stiff lift, from two starts: the second derivative has a block that is nearly zero, and whose
+    left and right vectors are orthogonal."""
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><option timestep="0.002"/><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/>
+        <geom size=".05" mass="5" contype="0" conaffinity="0"/><body><joint name="q" axis="0 1 0" damping="0.02"/>
+        <geom size="0.05" pos="0 0 -0.5" mass="1" contype="0" conaffinity="0"/></body></body></worldbody>
+        <actuator><position joint="lift" kp="200000" kv="2000"/></actuator></mujoco>"""
+    )
+    cycle = CycleMap(model, 0.02 * np.sin(2.0 * np.pi * np.arange(353) / 353)[:, None])
+    for begun in (0.0, 0.5):
+        found = cycle_multipliers("swing", cycle, np.array([0.0, begun, 0.0, 0.0]), ["q"])
+        assert found.stable is False
+        # Liouville: the product is exp of the mean divergence, -d / (m l^2 + I) over the period, to the step's order.
+        inertia = 0.25 + 0.4 * 0.05**2
+        first, second = (mode.multiplier.real for mode in found.exact[:2])
+        assert first * second == pytest.approx(np.exp(-0.02 / inertia * 0.706), rel=1e-4)
+        assert max(mode.error for mode in found.exact) < 1e-7
+        assert [round(mode.multiplier.real, 2) for mode in found.finite[:2]] == [-1.1, -0.86]
+
+
 def test_coordinates_lead_to_the_state_and_back_wherever_it_stands():
     cycle, standing = walk_cycle(STIFF)
     x = standing + np.random.default_rng(0).uniform(-0.02, 0.02, (3, 71))

@@ -42,6 +42,7 @@ AMPLITUDE = math.radians(1.0)
 
 _LEADING = 3  # multipliers
 _SETTLING, _CLOSING, _MEMORY = 30, 30, 10  # cycles: to settle, and of Anderson's method
+_NEARER, _APART = 300, 0.75  # cycles in which a walk comes nearer to a fixed point that it settles into; part left
 _CLOSED = 1e-11  # m, rad, per second
 _STEPS = (1e-7, 1e-8)  # of the differences; the first that changes no contact
 _ROUNDING = float(np.finfo(float).eps)
@@ -97,8 +98,8 @@ def _found(
     name: str, cycle: CycleMap, start: Array, bends: Sequence[str], amplitude: float, cycles: int, straight: bool
 ) -> CycleMultipliers:
     """Multipliers of :func:`cycle_multipliers`, and whether a walk that is to be straight has given way."""
-    if not (isinstance(amplitude, Real) and 0.0 < amplitude < 1.0):
-        allowed = "above 0, below 1, in the unit of the bends (rad)"
+    if not (isinstance(amplitude, Real) and _STEPS[-1] <= amplitude < 1.0):
+        allowed = f"{_STEPS[-1]:g} or more, which rounding does not hide, below 1, in the unit of the bends (rad)"
         raise ParameterError("must be a small number", field="amplitude", value=amplitude, allowed=allowed)
     checked_count("cycles", cycles, _MOST_CYCLES, 3 * _BLOCK)
     at = _indices(cycle, bends)
@@ -185,20 +186,39 @@ def _check_settled(cycle: CycleMap, seen: Array) -> None:
 
 
 def _closed(cycle: CycleMap, x: Array) -> tuple[Array, bool]:
-    """State (n,) of a settled walk, and whether it repeats: the fixed point nearby by Anderson's method, if found."""
-    for _ in range(_SETTLING):
-        x = cycle(x[None])[0][0]
-    settled = x
+    """State (n,) of a settled walk, and whether it repeats: the fixed point nearby by Anderson's method, if found. One
+    that is farther than the walk has moved counts if the walk comes nearer to it: that method jumps. From where
+    the walk is then, or from where a walk that still settles is, it begins once more."""
+    for cycles in (_SETTLING, _NEARER):
+        begun, moves = x, [np.inf]
+        for _ in range(cycles):
+            before, x = x, cycle(x[None])[0][0]
+            moves.append(float(np.abs(x - before).max()))
+        settled, fixed = x, _fixed(cycle, x)
+        if fixed is None and not (np.diff(moves[-_SETTLING // 2 :]) < 0.0).all():
+            return settled, False
+        apart = np.inf if fixed is None else float(np.abs(fixed - settled).max())
+        if fixed is not None and apart <= np.abs(settled - begun).max():
+            return fixed, True
+        for _ in range(_NEARER):
+            x = cycle(x[None])[0][0]
+            if fixed is not None and np.abs(fixed - x).max() < _APART * apart:
+                return fixed, True
+    return settled, False
+
+
+def _fixed(cycle: CycleMap, x: Array) -> Array | None:
+    """Fixed point by Anderson's method, if found."""
     before: list[tuple[Array, Array]] = []
     with suppress(AnalysisError):  # it falls
         for _ in range(_CLOSING):
             off = cycle(x[None])[0][0] - x
             if np.abs(off).max() < _CLOSED:
-                return x, True
+                return x
             before = [*before[-_MEMORY:], (x, off)]
             moves, changes = np.diff(before, axis=0).transpose(1, 2, 0)
             x = x + off - (moves + changes) @ np.linalg.lstsq(changes, off, rcond=None)[0]
-    return settled, False
+    return None
 
 
 def _derivative(cycle: CycleMap, x: Array, step: float) -> tuple[Array, Array]:
@@ -222,16 +242,21 @@ def _switched(cycle: CycleMap, x: Array, basis: Array, step: float) -> Array:
 
 
 def _leading(derivative: Array, at: _Indices) -> tuple[Array, Array]:
-    """Real basis of the leading modes, (n, r), of which the largest bend, or without one entry, is 1; and its dual."""
+    """Real basis of the leading modes, (n, r), of which the largest bend, or without one entry, is 1; and its dual. The
+    last ones are left out if only the others can be told from the rest, as those that die out within a cycle."""
     # Left eigenvectors of their own: the inverse of the right ones is lost if any mode at all is defective.
     values, left, right = eig(derivative, left=True)
     order = falling(values)
     values, left, right = values[order], left[:, order], right[:, order]
-    kept = np.arange(whole_pairs(values, _LEADING))
-    modes, second = right[:, kept] / _largest(right[:, kept], at), values[kept].imag < 0.0
-    basis = np.where(second, modes.imag, modes.real)
-    rows = np.where(second, left[:, kept].imag, left[:, kept].real).T
-    return basis, np.linalg.solve(rows @ basis, rows)
+    for count in range(_LEADING, 0, -1):
+        kept = np.arange(whole_pairs(values, count))
+        modes, second = right[:, kept] / _largest(right[:, kept], at), values[kept].imag < 0.0
+        basis = np.where(second, modes.imag, modes.real)
+        rows = np.where(second, left[:, kept].imag, left[:, kept].real).T
+        dual = np.linalg.pinv(rows @ basis) @ rows
+        if np.abs(dual @ basis - np.eye(kept.size)).max() < _KINK:
+            break
+    return basis, dual
 
 
 def _largest(modes: NDArray[Any], at: _Indices) -> NDArray[Any]:
