@@ -344,6 +344,19 @@ def test_a_place_that_matters_is_not_divided_out(stiffness):
         cycle_multipliers("slide", cycle, np.zeros(3), ["p"])
 
 
+@pytest.mark.parametrize("count", [1, 4, 5, 8])
+def test_bars_that_repeat_within_a_metre_are_no_flat_floor(count):
+    bars = "".join(f'<geom type="capsule" fromto="{i / count} -1 0 {i / count} 1 0" size="0.06"/>' for i in range(12))
+    text = f"""<mujoco><option cone="elliptic"/><worldbody>{bars}<body pos="0 0 0.1795">
+      <joint name="x" type="slide" axis="1 0 0" damping="1"/><joint name="z" type="slide" axis="0 0 1" damping="1"/>
+      <geom size="0.12" mass="1" friction="0 0 0"/></body></worldbody></mujoco>"""
+    # The ball stands on a bar, from which it slides to either side.
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(text), np.zeros((50, 0)), travel=("x",))
+    assert cycle.depends_on_place(np.zeros(3)) == "x"
+    with pytest.raises(AnalysisError, match="must not depend on x, which is divided out"):
+        cycle_multipliers("ball", cycle, np.zeros(3), ["z"])
+
+
 def test_a_joint_without_a_name_is_not_divided_out_either():
     model = mujoco.MjModel.from_xml_string(SLIDE.format(2).replace('name="x"', ""))
     cycle = CycleMap(model, PUSH, travel=("joint 0",))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import math
+from itertools import product
 from typing import Any
 
 import mujoco
@@ -24,7 +26,7 @@ _TOLERANCE = 1e-15
 
 _FREE, *_PLAIN = map(int, (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
 _WHOLE = 1e-9  # of a cycle
-_ELSEWHERE = 1.0  # m or rad
+_ELSEWHERE = 1.0, (math.sqrt(5.0) - 1.0) / 2.0  # m or rad; no world repeats at both, however short its period
 _ALIKE = 1e-7  # largest change of a coordinate by rounding
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the body has fallen
 _SPEEDS = ("ahead", "left", "up", "roll", "pitch", "yaw")
@@ -129,22 +131,23 @@ class CycleMap:
 
     def depends_on_place(self, x: Array) -> str:
         """Name of a place ("x", "y" or "the heading" of a free body, or a joint of ``travel``) on which the cycle from
-        a state (n,) depends, or "": the cycle is repeated from 1 m or 1 rad away, and must end with the same
-        coordinates."""
+        a state (n,) depends, or "": the cycle is repeated from 1 and from 0.618... m or rad away, where no world that
+        repeats itself looks the same twice, and must end with the same coordinates."""
         places = {"x": 0, "y": 1, "the heading": 3} if self._free else {}
         places |= {name: 7 * self._free + i for i, name in enumerate(self._joints) if i not in self._kept}
-        positions, rates = self.full(np.repeat(np.atleast_2d(x), len(places) + 1, axis=0))
-        for row, (name, at) in enumerate(places.items(), 1):
+        moved = list(product(places, _ELSEWHERE))
+        positions, rates = self.full(np.repeat(np.atleast_2d(x), len(moved) + 1, axis=0))
+        for row, (name, far) in enumerate(moved, 1):
             if name == "the heading":
-                turned = Rotation.from_rotvec([0.0, 0.0, _ELSEWHERE])
+                turned = Rotation.from_rotvec([0.0, 0.0, far])
                 rates[row, :3] = turned.apply(rates[row, :3])
                 body = turned * Rotation.from_quat(positions[row, 3:7], scalar_first=True)
                 positions[row, 3:7] = body.as_quat(scalar_first=True)
             else:
-                positions[row, at] += _ELSEWHERE
+                positions[row, places[name]] += far
         images = self._run(positions, rates)[0]
         off = np.abs(images - images[0]).max(axis=1)
-        return next((name for name, change in zip(places, off[1:], strict=True) if change > _ALIKE), "")
+        return next((name for (name, _), change in zip(moved, off[1:], strict=True) if change > _ALIKE), "")
 
     def changing(self, states: Array) -> tuple[str, ...]:
         """Geoms of moving bodies whose contacts differ between the cycles from states (runs, n), and joints whose
