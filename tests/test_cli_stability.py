@@ -149,7 +149,11 @@ def test_bad_input_is_one_line_that_names_it(parameter, between, expected):
             ("aoi2022", "--engine", "twin", "--onset", K1, "75 N*mm/deg", "20 N*mm/deg"),
             f"--onset = '{K1} 75 N*mm/deg 20",
         ),
+        (("aoi2022", "--engine", "twin", "--onset", "springs.k", "2", "3"), "--onset = 'springs.k"),
+        (("aoi2022", "--engine", "twin", "--onset", K1, "2 kg", "3"), f"--onset {K1} = '2 kg': is a mass"),
         ((PRESET, "--amplitude", "2 deg"), "must be 'twin' for --amplitude"),
+        ((PRESET, "--amplitude", "1 deg"), "must be 'twin' for --amplitude"),
+        (("aoi2022", "--engine", "twin", "--amplitude", ""), "--amplitude = ''"),
     ],
 )
 def test_an_engine_without_multipliers_is_one_line_that_names_it(arguments, expected, monkeypatch):

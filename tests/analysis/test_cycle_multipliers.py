@@ -9,7 +9,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.analysis import cycle_multipliers, walk_multipliers
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
-from chilopod.analysis.cycle_multipliers import AMPLITUDE, spectral_moves
+from chilopod.analysis.cycle_multipliers import AMPLITUDE, finite_modes, spectral_moves
 from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, start, walk_cycle
@@ -160,6 +160,7 @@ def test_bends_set_in_where_their_multiplier_passes_1(monkeypatch):
             np.array([found["onset_si"], *found["interval_si"]]) / per_unit, [30.0, 29.9, 30.1], atol=0.03
         )
     assert "must hold an onset" in run(*arguments, "40 N*mm/deg", "50 N*mm/deg")[2]
+    assert run(*arguments, "0.2", "50 N*mm/deg")[2].startswith("note: a number without a unit is SI: --onset is 0.2")
     said = run(*arguments, "10 N*mm/deg", "27 N*mm/deg")[2]
     assert "must hold an onset; its ends have a walk that has given way and the multiplier 1.0305" in said
 
@@ -170,7 +171,8 @@ def test_the_command_line_prints_them(straight, monkeypatch):
     arguments = ["stability", "aoi2022", "--engine", "twin", "--amplitude", "2 deg"]
     assert printed(*arguments, "--json") == straight.as_json()
     assert run(*arguments)[1].splitlines() == straight.lines()
-    assert asked[0]["amplitude"] == pytest.approx(np.radians(2.0))
+    assert run(*arguments[:-2], "--json")[0] == 0
+    assert [each["amplitude"] for each in asked] == pytest.approx(np.radians([2.0, 2.0, 1.0]))
 
 
 @pytest.mark.parametrize(
@@ -279,10 +281,59 @@ def test_bends_are_shown_in_their_unit(bends, size):
     assert not any("°" in row for row in rows)
 
 
-def test_a_model_without_such_a_state_and_a_walk_that_falls_are_refused():
-    ball = '<mujoco><worldbody><body><joint type="ball"/><geom size="0.1"/></body></worldbody></mujoco>'
-    with pytest.raises(ParameterError, match="must have a state that can be put back"):
-        CycleMap(mujoco.MjModel.from_xml_string(ball), np.zeros((5, 0)))
+BODY = '<body pos="1 0 0">{}<geom size="0.1"/></body>'
+HINGE = BODY.format('<joint name="p"/>')
+MOTOR = '<actuator><motor name="m" joint="p" {}/></actuator>'
+
+
+@pytest.mark.parametrize(
+    ("bodies", "others", "complaint"),
+    [
+        ('<geom size="1"/>', "", "model: must have a joint"),
+        (BODY.format('<joint type="ball" name="b"/>'), "", "model joint b: must be a hinge or a slide, not a ball"),
+        (BODY.format("<freejoint/>") * 2, "", "model joint 1: must not be free: only the first joint may"),
+        (HINGE, MOTOR.replace("motor", "muscle").format('lengthrange="0 1"'), "model actuator m: must have no state"),
+        (HINGE, MOTOR.format('delay="0.3" nsample="200"'), "model actuator m: must have no delay"),
+        (HINGE, '<sensor><jointpos joint="p" delay=".1" nsample="9"/></sensor>', "model sensor 0: must have no delay"),
+        (
+            BODY.format('<joint name="p" stiffness="5" springyield="1"/>'),
+            "",
+            "joint p: must have a spring that does not",
+        ),
+        (HINGE, '<option gravity="1 0 -9"/>', r"model.opt.gravity = \[1.0, 0.0, -9.0\]: must be vertical"),
+        (HINGE, '<option><flag sleep="enable"/></option>', "model.opt.enableflags: must not let bodies sleep"),
+    ],
+)
+def test_what_hides_a_part_of_the_state_is_named(bodies, others, complaint):
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{bodies}</worldbody>{others}</mujoco>")
+    with pytest.raises(ParameterError, match=complaint):
+        CycleMap(model, np.zeros((5, model.nu)))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "complaint"),
+    [
+        ("opt.timestep", 0.0, "opt.timestep = 0.0: must be a time step in s; allowed: above 0"),
+        ("opt.timestep", -0.001, "opt.timestep = -0.001: must be a time step"),
+        ("opt.timestep", np.nan, "opt.timestep = nan: must be a time step"),
+        ("opt.viscosity", np.inf, "opt.viscosity = inf: must be finite"),
+        ("body_mass", [0.0, np.nan], r"body_mass\[1\] = nan: must be finite"),
+        ("jnt_range", [[-np.inf, np.nan]], r"jnt_range\[0, 1\] = nan: must be finite"),
+    ],
+)
+def test_numbers_of_a_model_are_finite_and_time_goes_on(name, value, complaint):
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{HINGE}</worldbody></mujoco>")
+    if isinstance(value, list):
+        getattr(model, name)[:] = value
+    else:
+        setattr(model.opt, name.removeprefix("opt."), value)
+    with pytest.raises(ParameterError, match=f"model.{complaint}"):
+        CycleMap(model, np.zeros((5, 0)))
+    model.opt.timestep, model.opt.viscosity, model.body_mass[1], model.jnt_range[0, 1] = 0.01, 0.0, 1.0, np.inf
+    assert CycleMap(model, np.zeros((5, 0))).period == 0.05
+
+
+def test_a_walk_that_falls_is_refused():
     cycle, lying = walk_cycle(STIFF)
     lying[1] = 1.5
     with pytest.raises(AnalysisError, match="the walk falls"):
@@ -390,12 +441,6 @@ def test_a_box_at_rest_is_stable_whatever_the_frame_of_its_body(pitch):
     assert found.title == "box: the periodic motion is stable"
     assert [abs(mode.multiplier) for mode in found.exact] == pytest.approx([0.030864, 0.030326, 0.029414], abs=2e-6)
     assert [mode.shape for mode in found.exact].count("bend") == 1
-
-
-def test_actuators_with_a_delay_are_refused():
-    text = SLIDE.format(0).replace('<motor joint="p"/>', '<motor joint="p" delay="0.3" nsample="200"/>')
-    with pytest.raises(ParameterError, match="state that can be put back"):
-        CycleMap(mujoco.MjModel.from_xml_string(text), PUSH)
 
 
 STOP = """<mujoco><option timestep="0.002"/><worldbody><body>
@@ -528,6 +573,13 @@ def test_a_pair_turns_only_beyond_its_error(multiplier, error, shown, shape, tur
         ),
         (lambda cycle: cycle(np.zeros((0, 2))), r"x = \(0, 2\): must be coordinates"),
         (lambda cycle: cycle("x"), "x = 'x': must be an array of numbers"),
+        (lambda cycle: cycle.path(np.zeros((2, 2))), r"x = \(2, 2\): must be the coordinates of a state"),
+        (lambda cycle: cycle.depends_on_place(np.zeros((2, 2))), r"x = \(2, 2\): must be the coordinates of a state"),
+        (lambda cycle: cycle.reduced([0.0], [0.0, 1.0]), r"positions, rates = .*must have the shapes of states"),
+        (
+            lambda cycle: cycle_multipliers("leg", cycle.model, [0.0, 0.0], ["a"]),
+            "cycle = 'MjModel': must be a chilopod.twin.CycleMap",
+        ),
     ],
 )
 def test_wrong_arguments_of_a_cycle_map_are_one_line(wrong, complaint):
@@ -535,3 +587,18 @@ def test_wrong_arguments_of_a_cycle_map_are_one_line(wrong, complaint):
     assert cycle([0.0, 0.0])[0].tolist() == [[0.0, 0.0]]
     with pytest.raises(ParameterError, match=complaint):
         wrong(cycle)
+
+
+def test_lists_are_states_and_a_cycle_map_does_not_change():
+    cycle = free_map(STOP.format("", ""))
+    path = cycle.path([0.1, 0.0])
+    np.testing.assert_array_equal(path[-1], cycle([0.1, 0.0])[0][0])
+    assert cycle.reduced([1.0], [2.0]).tolist() == [1.0, 2.0]
+    assert cycle.depends_on_place([0.1, 0.0]) == ""
+    assert cycle.changing([0.1, 0.0]) == ()
+    modes = [finite_modes(cycle, start, ["a"])[0][0].multiplier for start in ([0.1, 0.0], np.array([0.1, 0.0]))]
+    assert modes[0] == modes[1]
+    with pytest.raises(ValueError, match="read-only"):
+        cycle.control[:] = 3.0
+    with pytest.raises(AttributeError, match="period"):
+        cycle.period = 9.0

@@ -22,7 +22,7 @@ from scipy.linalg import eig
 from chilopod import units
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
 from chilopod.engine import Engine, engine_named
-from chilopod.engine.arguments import as_array
+from chilopod.engine.arguments import as_array, require
 from chilopod.errors import AnalysisError, ParameterError, known_names
 from chilopod.flows.arguments import checked_count
 from chilopod.frozen import Array
@@ -148,7 +148,7 @@ def finite_modes(
     """Leading modes of bends of a given size alone, by falling modulus, :func:`cycle_multipliers` at half its cost. The
     arguments are the same, and ``basis``, leading modes (n, r) and their dual (r, n) of a similar walk that has settled
     at ``start``. Returns the modes, with errors by scatter alone, the settled state, (n,), and the basis."""
-    at, x = _indices(cycle, bends), start
+    at, x = _indices(cycle, bends), as_array("start", start)
     for _ in range(_SETTLING if basis is None else _FORGOTTEN * _BLOCK):
         x = cycle(x[None])[0][0]
     forgotten = _FORGOTTEN if basis is None else _BLOCK
@@ -159,8 +159,11 @@ def finite_modes(
 
 def _indices(cycle: CycleMap, bends: Sequence[str]) -> _Indices:
     """Indices of coordinates with these names."""
-    if not bends or isinstance(bends, str):
-        raise ParameterError("must be a list of names", field="bends", value=bends, allowed=", ".join(cycle.names))
+    from chilopod.twin import CycleMap
+
+    require(isinstance(cycle, CycleMap), "must be a chilopod.twin.CycleMap", "cycle", type(cycle).__name__)
+    fits = len(bends) and not isinstance(bends, str)
+    require(fits, "must be a list of names", "bends", bends, ", ".join(cycle.names))
     known_names(bends, cycle.names, "bends", "must be a coordinate")
     return np.array([cycle.names.index(each) for each in bends])
 

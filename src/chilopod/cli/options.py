@@ -223,21 +223,21 @@ def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> No
             raise failure
 
 
-def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:
+def interval(robot: Robot, parameter: str, between: tuple[str, ...], option: str = "between") -> tuple[float, float]:
     """Read the interval of a parameter, in SI units, and refuse one that is reversed or that the robot cannot have."""
     from chilopod import units
     from chilopod.analysis.parameters import check_parameter
 
-    with concerning("parameter"):
+    with concerning("parameter" if option == "between" else option):
         check_parameter(robot, parameter)
     unit = robot.si_unit_of(parameter)
-    with concerning(f"between {parameter}"):
+    with concerning(f"{option} {parameter}"):
         low, high = (units.parse(text, unit) for text in between)
         for text in between:
             robot.override(parameter, text)
     if not low < high:
-        raise ParameterError("must rise from a lower to a higher value", field="between", value=" ".join(between))
-    note_si(robot, parameter, "--between", between)
+        raise ParameterError("must rise from a lower to a higher value", field=option, value=" ".join(between))
+    note_si(robot, parameter, f"--{option}", between)
     return low, high
 
 

@@ -33,8 +33,8 @@ def stability(
     options: RobotOptions,
     engine: EngineOption = "planar",
     amplitude: Annotated[
-        str, typer.Option(metavar="ANGLE", help='Size of the bends that the twin is given, such as "1 deg".')
-    ] = _AMPLITUDE,
+        str | None, typer.Option(metavar="ANGLE", help=f'Size of the bends of the twin, by default "{_AMPLITUDE}".')
+    ] = None,
     onset: Annotated[
         tuple[str, str, str] | None,
         typer.Option(metavar="PATH LOW HIGH", help="Number of the robot, and values between which bends set in."),
@@ -55,10 +55,10 @@ def stability(
     """
     described = options.described
     files = options.free_in(out, "stability.json")
-    size = shared.quantity("amplitude", amplitude, "rad")
+    size = shared.quantity("amplitude", _AMPLITUDE if amplitude is None else amplitude, "rad")
     if engine == "planar" and onset:
         raise ParameterError("must be 'twin' for --onset", field="engine", value=engine, allowed="chilopod bifurcation")
-    if engine == "planar" and amplitude != _AMPLITUDE:
+    if engine == "planar" and amplitude is not None:
         raise ParameterError("must be 'twin' for --amplitude", field="engine", value=engine)
     if not 0.0 < size < 1.0:
         allowed = "above 0, below 1 rad"
@@ -86,12 +86,8 @@ def _of_bends(
     from chilopod import units
     from chilopod.analysis import bend_onset
 
-    path, unit = onset[0], robot.unit_of(onset[0])
-    try:
-        point = bend_onset(multipliers, robot, path, shared.interval(robot, path, onset[1:]))
-    except ParameterError as error:
-        error.field = "onset" if error.field in ("between", "parameter") else error.field
-        raise
+    path, between = onset[0], shared.interval(robot, onset[0], onset[1:], "onset")
+    point, unit = bend_onset(multipliers, robot, path, between), robot.unit_of(path)
     shown = [units.format(each, unit, digits=4) for each in (point.value, point.low, point.high)]
     said = f"{robot.name}: multiplier of bends passes 1 at {path} = {shown[0]}, 95 %: {shown[1]} to {shown[2]}"
     found = {"robot": robot.name, "parameter": path, "onset_si": point.value, "interval_si": [point.low, point.high]}

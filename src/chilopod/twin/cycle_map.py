@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from itertools import product
+from operator import attrgetter
 from typing import Any
 
 import mujoco
@@ -16,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from chilopod.cores import cores
 from chilopod.engine.arguments import as_array, require
 from chilopod.errors import AnalysisError
-from chilopod.frozen import Array
+from chilopod.frozen import Array, read_only
 from chilopod.robot import Robot
 from chilopod.twin.legs import servo_targets, twin_of
 from chilopod.twin.model import Edit, compiled, silence
@@ -29,6 +30,23 @@ _WHOLE = 1e-9  # of a cycle
 _ELSEWHERE = 1.0, (math.sqrt(5.0) - 1.0) / 2.0  # m or rad; no world repeats at both, however short its period
 _ALIKE = 1e-7  # largest change of a coordinate by rounding
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the body has fallen
+_PARTS = (
+    "act",
+    "body",
+    "dof",
+    "eq_",
+    "flex",
+    "geom",
+    "hfield",
+    "jnt",
+    "mesh_vert",
+    "pair",
+    "qpos",
+    "site",
+    "ten",
+    "wrap",
+)
+"""Beginnings of the names of a model's numbers that may change its motion; others are for pictures."""
 _SPEEDS = ("ahead", "left", "up", "roll", "pitch", "yaw")
 
 
@@ -51,23 +69,17 @@ class CycleMap:
 
     def __init__(self, model: mujoco.MjModel, control: ArrayLike, travel: tuple[str, ...] = ()) -> None:
         require(isinstance(model, mujoco.MjModel), "must be a mujoco.MjModel", "model", type(model).__name__)
-        self.model, self.control = copy.copy(model), np.array(as_array("control", control))
+        self.model, self.control = copy.copy(model), read_only(as_array("control", control))
+        _check(self.model)
         kinds = self.model.jnt_type.tolist()
-        self._free = free = kinds[:1] == [_FREE]
-        flags, states = self.model.opt.enableflags, (self.model.na, self.model.nhistory, self.model.npluginstate)
-        asleep = flags & int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-        plain = kinds and set(kinds[free:]) <= set(_PLAIN) and not self.model.opt.gravity[:2].any()
-        allowed = "hinges and slides behind at most one free joint, actuators and sensors without states or delays, "
-        allowed += "bodies that do not sleep, vertical gravity"
-        fits = plain and not any(states) and not asleep
-        require(fits, "must have a state that can be put back", "model", allowed=allowed)
+        self._free = free = kinds[0] == _FREE
         fits = self.control.ndim == 2 and self.control.shape[1] == self.model.nu and len(self.control)
         allowed = f"a row for each step, {self.model.nu} columns"
         require(fits, "must be a table", "control", self.control.shape, allowed)
         finite = np.isfinite(self.control)
         require(finite.all(), "must be finite", "control", next(iter(self.control[~finite].tolist()), None))
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-        self.model.opt.tolerance, self.period = _TOLERANCE, len(self.control) * float(self.model.opt.timestep)
+        self.model.opt.tolerance = _TOLERANCE
         self._joints = joints = [self.model.joint(i).name or f"joint {i}" for i in range(free, len(kinds))]
         named = type(travel) in (tuple, list) and len(set(joints).intersection(travel)) == len(travel)
         require(named, "must name joints", "travel", travel, ", ".join(joints))
@@ -78,8 +90,17 @@ class CycleMap:
         units = ["m/s"] * 3 * free + ["rad/s"] * 3 * free + [f"{unit}/s" for unit in measures]
         self.units = (*("m", "rad", "rad")[: 3 * free], *(measures[i] for i in self._kept), *units)
 
-    def reduced(self, positions: Array, rates: Array) -> Array:
+    @property
+    def period(self) -> float:
+        """Length of a cycle in s."""
+        return len(self.control) * float(self.model.opt.timestep)
+
+    def reduced(self, positions: ArrayLike, rates: ArrayLike) -> Array:
         """Coordinates, shape (runs, n) or (n,), from MuJoCo's ``qpos`` (..., nq) and ``qvel`` (..., nv)."""
+        positions, rates = as_array("positions", positions), as_array("rates", rates)
+        fits = (positions.shape[-1:], rates.shape) == ((self.model.nq,), (*positions.shape[:-1], self.model.nv))
+        allowed = f"(..., {self.model.nq}) and (..., {self.model.nv})"
+        require(fits, "must have the shapes of states", "positions, rates", (positions.shape, rates.shape), allowed)
         if not self._free:
             return np.concatenate([positions[..., self._kept], rates], axis=-1)
         turn = Rotation.from_quat(positions[..., 3:7], scalar_first=True).as_euler("ZYX")
@@ -106,10 +127,16 @@ class CycleMap:
         from states before it, shape (runs, n) or (n,); AnalysisError if one falls."""
         return self._run(*map(np.atleast_2d, self.full(x)))
 
-    def path(self, x: Array) -> Array:
+    def path(self, x: ArrayLike) -> Array:
         """States after every step of a cycle, (steps, n), from the state before it, (n,)."""
-        seen = self._rolled(*self.full(x[None]), ["qpos", "qvel"])[1]
+        seen = self._rolled(*self.full(self._one(x)), ["qpos", "qvel"])[1]
         return self.reduced(seen["qpos"][0], seen["qvel"][0])
+
+    def _one(self, x: ArrayLike) -> Array:
+        """A single state as an array (1, n)."""
+        x = as_array("x", x)
+        require(x.ndim == 1, "must be the coordinates of a state", "x", x.shape, f"({len(self.names)},)")
+        return x[None]
 
     def _rolled(self, positions: Array, rates: Array, record: list[str]) -> tuple[Batch, dict[Any, NDArray[Any]]]:
         """Walks at the end of a cycle, and what is recorded of each of their steps."""
@@ -129,14 +156,14 @@ class CycleMap:
             raise AnalysisError(said, field="multipliers", allowed=allowed)
         return image, (seen["ncon"] + seen["nl"]).reshape(len(positions), -1)
 
-    def depends_on_place(self, x: Array) -> str:
+    def depends_on_place(self, x: ArrayLike) -> str:
         """Name of a place ("x", "y" or "the heading" of a free body, or a joint of ``travel``) on which the cycle from
         a state (n,) depends, or "": the cycle is repeated from 1 and from 0.618... m or rad away, where no world that
         repeats itself looks the same twice, and must end with the same coordinates."""
         places = {"x": 0, "y": 1, "the heading": 3} if self._free else {}
         places |= {name: 7 * self._free + i for i, name in enumerate(self._joints) if i not in self._kept}
         moved = list(product(places, _ELSEWHERE))
-        positions, rates = self.full(np.repeat(np.atleast_2d(x), len(moved) + 1, axis=0))
+        positions, rates = self.full(np.repeat(self._one(x), len(moved) + 1, axis=0))
         for row, (name, far) in enumerate(moved, 1):
             if name == "the heading":
                 turned = Rotation.from_rotvec([0.0, 0.0, far])
@@ -149,9 +176,10 @@ class CycleMap:
         off = np.abs(images - images[0]).max(axis=1)
         return next((name for (name, _), change in zip(moved, off[1:], strict=True) if change > _ALIKE), "")
 
-    def changing(self, states: Array) -> tuple[str, ...]:
+    def changing(self, states: ArrayLike) -> tuple[str, ...]:
         """Geoms of moving bodies whose contacts differ between the cycles from states (runs, n), and joints whose
         limits do, and when, in words; first those that differ for longest."""
+        states = np.atleast_2d(as_array("states", states))
         geoms, limit = self.model.ngeom, int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
         touching = np.zeros((len(states), len(self.control), geoms + self.model.njnt), dtype=np.bool_)
         for one, state in zip(touching, states, strict=True):
@@ -170,6 +198,40 @@ class CycleMap:
             name = self.model.geom(geom).name or geom if joint < 0 else f"limit of {self._joints[joint - self._free]}"
             found.append(f"{name} at {first:.3f} to {last + timestep:.3f} s")
         return tuple(found)
+
+
+def _check(model: mujoco.MjModel) -> None:
+    """ParameterError unless a model's numbers are finite, and its state, positions and rates alone, can be divided by
+    its place."""
+    timestep, parts = float(model.opt.timestep), [f"model.{name}" for name in dir(model) if name.startswith(_PARTS)]
+    require(0.0 < timestep < np.inf, "must be a time step in s", "model.opt.timestep", timestep, "above 0")
+    for name in (*(f"model.opt.{name}" for name in dir(model.opt) if name[0] != "_"), *parts):
+        values = np.asarray(attrgetter(name.partition(".")[2])(model))
+        if values.dtype.kind == "f" and not name.endswith(("_user", "_rgba")):
+            wrong = np.isnan(values) if name.endswith("range") else ~np.isfinite(values)  # no limit may be infinite
+            at = np.argwhere(wrong)[:1].tolist()
+            require(not at, "must be finite", f"{name}{(at or [''])[0] or ''}", values[wrong][0] if at else None)
+    kinds, sleep = model.jnt_type.tolist(), int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    require(kinds, "must have a joint", "model")
+    hidden = (
+        ("joint", [kind not in (_FREE, *_PLAIN) for kind in kinds], "must be a hinge or a slide, not a ball"),
+        ("joint", [i and kind == _FREE for i, kind in enumerate(kinds)], "must not be free: only the first joint may"),
+        ("actuator", model.actuator_actnum, "must have no state"),
+        ("actuator", model.actuator_history[:, 0], "must have no delay"),
+        ("sensor", model.sensor_history[:, 0], "must have no delay"),
+        ("joint", model.jnt_springyield, "must have a spring that does not yield"),
+        ("tendon", model.tendon_springyield, "must have a spring that does not yield"),
+        ("flex", model.flex_yield, "must not yield"),
+        ("plugin", model.plugin_statenum, "must have no state"),
+    )
+    for what, has, said in hidden:
+        for i in np.flatnonzero(has)[:1].tolist():
+            name = mujoco.mj_id2name(model, getattr(mujoco.mjtObj, f"mjOBJ_{what.upper()}"), i) or i
+            allowed = "a state that is positions and rates alone, of one free body at most"
+            require(False, said, f"model {what} {name}", allowed=allowed)
+    require(not model.opt.enableflags & sleep, "must not let bodies sleep", "model.opt.enableflags")
+    gravity = model.opt.gravity
+    require(not gravity[:2].any(), "must be vertical", "model.opt.gravity", gravity.tolist())
 
 
 def walk_cycle(robot: Robot, edit: Edit | None = None) -> tuple[CycleMap, Array]:
