@@ -1,5 +1,6 @@
 """Multipliers of walks in MuJoCo: against solutions by hand, walks that decay, and other paths to the same state."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import mujoco
@@ -333,6 +334,28 @@ def test_numbers_of_a_model_are_finite_and_time_goes_on(name, value, complaint):
     assert CycleMap(model, np.zeros((5, 0))).period == 0.05
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_lengths_in_other_units_do_not_change_multipliers(scale):
+    spec, steps, h = mujoco.MjSpec.from_string(STOP.replace("0.002", "0.01").format("", "")), 628, 0.01
+    joint = spec.joint("a")
+    joint.stiffness, joint.damping = [1.0, 0.0, scale**-2], [0.2, 0.0, 0.0]
+    spec.add_actuator(name="m", target="a", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    push = 1.9 * np.cos(2.0 * np.pi * np.arange(steps) / steps)
+    cycle = CycleMap(spec.compile(), scale * push[:, None])
+    mode = cycle_multipliers("duffing", cycle, scale * np.array([1.41, 0.33]), ["a"]).exact[0]
+    # Euler's step with the damper at its end, as for the cart, and its derivative.
+    x, v = 1.41, 0.33
+    for _ in range(20):
+        whole = np.eye(2)
+        for force in push:
+            slope = h * (1.0 + 3.0 * x * x)
+            whole = np.array([[1.0 - h * slope / 1.002, h / 1.002], [-slope / 1.002, 1.0 / 1.002]]) @ whole
+            v = (v + h * (force - x - x**3)) / 1.002
+            x += h * v
+    value = np.linalg.eigvals(whole)[0]
+    assert abs(mode.multiplier - complex(value.real, abs(value.imag))) < mode.error < 2e-4
+
+
 def test_a_walk_that_falls_is_refused():
     cycle, lying = walk_cycle(STIFF)
     lying[1] = 1.5
@@ -485,6 +508,24 @@ HOPPER = """<mujoco><option timestep="0.001" cone="elliptic"/><worldbody>
   <joint name="l" type="slide" axis="0 0 1" damping="2" stiffness="300"/>
   <geom type="sphere" size="0.05" mass="0.1"/></body></body></worldbody>
   <actuator><position joint="l" kp="100" kv="1"/></actuator></mujoco>"""
+
+
+WHEEL = """<mujoco><option timestep="0.001" cone="elliptic"/><worldbody><geom type="plane" size="9 9 1"/>
+  <body pos="0 0 0.2"><joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
+  <joint name="spin" axis="0 1 0" damping="0.02"/><geom size="0.2" mass="1" friction="0.8 0 0"/></body>
+</worldbody></mujoco>"""
+
+
+def test_no_more_is_said_of_contacts_than_the_modes_reach():
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(WHEEL), np.zeros((100, 0)))
+    found = cycle_multipliers("wheel", cycle, np.zeros(6), ["z"], cycles=12)
+    raised = found.state + np.array([0.0, found.reach, 0.0, 0.0, 0.0, 0.0])
+    assert (cycle(raised)[1] != cycle(found.state)[1]).any()  # the wheel leaves the floor, unlike along the modes
+    assert not any(mode.angles.any() for mode in found.exact)
+    said = "No move along these modes, up to about 0.005, changes a contact."
+    assert said in "\n".join(found.lines())
+    bends = replace(found, exact=(CycleMode(1.0 + 0.0j, 0.0, np.ones(1, complex)),))
+    assert said.replace("move", "bend").replace("0.005", "0.005 m") in "\n".join(bends.lines())
 
 
 def test_errors_contain_what_rounding_does_to_two_multipliers_near_zero():

@@ -148,7 +148,9 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
             scatter = f"bends scatter over {self._shown(float(self.spread.max()), 2)}"
             said = f"{closes}, {scatter}, and there is no derivative. Contacts change from cycle to cycle"
         else:
-            said = f"{closes}. No bend up to about {self._shown(self.reach, 1)} changes a contact"
+            bends = any(mode.angles.any() for mode in self.exact)  # or else reach is that of their largest coordinate
+            what, size = ("bend", self._shown(self.reach, 1)) if bends else ("move", f"{self.reach:.1g}")
+            said = f"{closes}. No {what} along these modes, up to about {size}, changes a contact"
             said += "; larger ones do" if self.contacts else ""
         contacts = f": {', '.join(self.contacts) or 'none found'}." if self.contacts or self.reach is None else "."
         return [], [head, *rows], [said + contacts, *self._remarks(size)]
