@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 from itertools import product
 from operator import attrgetter
 from typing import Any
@@ -30,23 +31,10 @@ _WHOLE = 1e-9  # of a cycle
 _ELSEWHERE = 1.0, (math.sqrt(5.0) - 1.0) / 2.0  # m or rad; no world repeats at both, however short its period
 _ALIKE = 1e-7  # largest change of a coordinate by rounding
 _UPRIGHT = 0.5  # cosine of the tilt beyond which the body has fallen
-_PARTS = (
-    "act",
-    "body",
-    "dof",
-    "eq_",
-    "flex",
-    "geom",
-    "hfield",
-    "jnt",
-    "mesh_vert",
-    "pair",
-    "qpos",
-    "site",
-    "ten",
-    "wrap",
+_PARTS = re.compile(
+    "(actuator|body|dof|eq|flex|geom|hfield|jnt|mesh_vert|pair|qpos|site|tendon|wrap)_?(?!.*(user|rgba))"
 )
-"""Beginnings of the names of a model's numbers that may change its motion; others are for pictures."""
+"""Names of a model's numbers that may change its motion; others are for pictures and users."""
 _SPEEDS = ("ahead", "left", "up", "roll", "pitch", "yaw")
 
 
@@ -203,11 +191,11 @@ class CycleMap:
 def _check(model: mujoco.MjModel) -> None:
     """ParameterError unless a model's numbers are finite, and its state, positions and rates alone, can be divided by
     its place."""
-    timestep, parts = float(model.opt.timestep), [f"model.{name}" for name in dir(model) if name.startswith(_PARTS)]
+    timestep, parts = float(model.opt.timestep), [f"model.{name}" for name in dir(model) if _PARTS.match(name)]
     require(0.0 < timestep < np.inf, "must be a time step in s", "model.opt.timestep", timestep, "above 0")
     for name in (*(f"model.opt.{name}" for name in dir(model.opt) if name[0] != "_"), *parts):
         values = np.asarray(attrgetter(name.partition(".")[2])(model))
-        if values.dtype.kind == "f" and not name.endswith(("_user", "_rgba")):
+        if values.dtype.kind == "f":
             wrong = np.isnan(values) if name.endswith("range") else ~np.isfinite(values)  # no limit may be infinite
             at = np.argwhere(wrong)[:1].tolist()
             require(not at, "must be finite", f"{name}{(at or [''])[0] or ''}", values[wrong][0] if at else None)
