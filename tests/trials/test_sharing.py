@@ -106,8 +106,9 @@ def test_trials_that_a_full_disk_does_not_keep_are_given_all_the_same(tmp_path, 
 def test_a_later_study_that_lacks_room_is_given_all_the_same(tmp_path, monkeypatch, caplog):
     """A command that runs several studies would lose what the first one came to."""
     monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=0))
-    with pytest.raises(OutputError, match=r"takes .* or more, and there is room for 0 bytes$"):
-        run(TRIALS[:1], tmp_path)
+    for _ in range(2):  # what this process did before does not count
+        with pytest.raises(OutputError, match=r"takes .* or more, and there is room for 0 bytes$"):
+            run(TRIALS[:1], tmp_path)
     monkeypatch.undo()
     run(TRIALS[:1], tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=0))

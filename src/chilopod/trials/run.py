@@ -23,7 +23,6 @@ _Walked = list[tuple[Trial, xr.Dataset]]
 
 _COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
 _LOOK = 0.2  # s between two looks whether other processes are done
-_used = set[Path]()  # folders in which this process has run a study
 _PATIENCE = 120.0  # s in which another process must finish a trial; a stopped process never does
 
 
@@ -32,7 +31,7 @@ def run(
 ) -> list[xr.Dataset]:
     """Run trials, or read the records of previous runs; return the record of every trial, with one ``robot`` and the
     trial in the attributes. Raises ParameterError or OutputError if memory cannot hold the records, or the folder has
-    no room for them; after another run into it they are given all the same, and one line says that they are not kept.
+    no room for them; if it holds trials already, they are given all the same, and one line says that they are not kept.
 
     Parameters
     ----------
@@ -125,13 +124,12 @@ class _Study:
             yield from self._given(walked)
 
     def _check_room(self, store: Store, needed: float) -> None:
-        """Refuse the first study of this process in a folder if it lacks room. Trials of a later one, as of a command
-        that runs several, are walked and not kept: a refusal would lose what the others came to."""
+        """Refuse a study whose folder lacks room. If it holds trials, as those of a study before in the same command,
+        others are walked and not kept: a refusal would lose what the former came to."""
         try:
             check_room(store.folder, needed)
-            _used.add(store.folder)
         except OutputError:
-            if store.folder not in _used:
+            if not store.holds_trials:
                 raise
             store.tell_unkept("there is no room")
             self._store = None

@@ -43,6 +43,11 @@ class Store:
         self.folder = check_folder(folder)
         self._tell, self._said = tell, set[str]()
 
+    @property
+    def holds_trials(self) -> bool:
+        """True if the folder has the file of any trial."""
+        return any(self.folder.glob("*.nc"))
+
     def has(self, trial: Trial) -> bool:
         """True if the folder has a file with the name of a trial's record."""
         return os.path.lexists(self.folder / trial.file_name)
