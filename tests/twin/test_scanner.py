@@ -9,6 +9,7 @@ from chilopod import load_robot
 from chilopod.record import bearing_and_distance
 from chilopod.steering import LegYawController
 from chilopod.twin import TwinModel, initial_states, simulate
+from chilopod.twin.model import POLE_GROUP, scanner_place
 from chilopod.twin.scanner import beams, detect, rotation, scan
 
 PRESET = load_robot("aoi2022")
@@ -103,6 +104,23 @@ def test_neither_floor_nor_robot_is_seen_even_when_it_nods():
     batch = placed(np.zeros((3, 2)), 0.0, np.full((3, 2), 30.0))
     batch.bind("qpos")[:, 3:7] = [[np.cos(a), 0.0, np.sin(a), 0.0] for a in (-0.05, 0.03, 0.1)]
     assert np.isnan(scan(TWIN, batch, poses(batch), np.arange(3))).all()
+
+
+def test_beams_that_are_left_out_would_hit_nothing():
+    positions, headings, poles, rng = random_scenes(3, count=100)
+    batch = placed(positions, headings, poles)
+    tilts = rng.normal(0.0, 0.1, (100, 4)) + batch.bind("qpos")[:, 3:7]
+    batch.bind("qpos")[:, 3:7] = tilts / np.linalg.norm(tilts, axis=1, keepdims=True)
+    angles, turns = beams(TWIN), rotation(poses(batch)[:, 3:])
+    local = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=-1)
+    away = local @ np.swapaxes(turns, 1, 2)
+    start = poses(batch)[:, :3] + turns @ scanner_place(TWIN)
+    whole, _ = batch.ray(start[:, None], away, geomgroup=np.arange(6) == POLE_GROUP)
+    for row in range(100):  # one at a time, as the beams that are followed are those of all
+        (found,) = scan(TWIN, batch, poses(batch), np.array([row]))
+        hit = (whole[row] >= TWIN.scanner_nearest) & (whole[row] <= TWIN.scanner_range)
+        expected = np.round(whole[row] / TWIN.scanner_resolution) * TWIN.scanner_resolution
+        np.testing.assert_array_equal(found, np.where(hit, expected, np.nan))
 
 
 def test_distances_are_rounded_to_the_resolution():

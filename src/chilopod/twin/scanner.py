@@ -7,6 +7,7 @@ nothing else reaches the height of the scanner. Distances are rounded to the sca
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,21 @@ from chilopod.robot import Twin
 from chilopod.twin.model import POLE_GROUP, scanner_place
 
 _SAME_INSTANT = 1e-9  # scans
+_MARGIN = 1e-6  # of the pole's radius, more than round-off
 _GROUPS = np.array([group == POLE_GROUP for group in range(6)], dtype=np.uint8)
 
 
 def beams(twin: Twin) -> Array:
     """Directions of all beams relative to ahead, from right to left, rad, (beams,)."""
-    half = round(0.5 * twin.scanner_view / twin.scanner_step)
-    return np.arange(-half, half + 1, dtype=np.float64) * twin.scanner_step
+    return _beams(twin.scanner_view, twin.scanner_step)[0]
+
+
+@lru_cache(maxsize=64)
+def _beams(view: float, step: float) -> tuple[Array, Array]:
+    """Angles of all beams, rad, and their unit vectors in the frame of module 1, (beams, 3), not to be written into."""
+    half = round(0.5 * view / step)
+    angles = np.arange(-half, half + 1, dtype=np.float64) * step
+    return angles, np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
 
 
 class Scanner:
@@ -99,20 +108,27 @@ def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: A
     Poses of module 1 are those of all robots at the time of the scan, position and quaternion, shape (robots, 7). Noise
     is given as standard normal deviates, shape (len(ids), beams).
     """
-    angles = beams(twin)
-    local = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
+    _, local = _beams(twin.scanner_view, twin.scanner_step)
     pose = poses[ids]
     turn = rotation(pose[:, 3:])
     start = pose[:, :3] + turn @ scanner_place(twin)
     away = local @ np.swapaxes(turn, 1, 2)
-    found, _ = batch.ray(start[:, None, :], away, geomgroup=_GROUPS, ids=ids)
+    # Few beams pass the axis of a pole nearer than its radius: only these are followed.
+    pole = batch.bind("mocap_pos")[ids, 0] - start
+    beside = np.abs(away[..., 0] * pole[:, 1, None] - away[..., 1] * pole[:, 0, None])
+    near = np.flatnonzero((beside <= (1.0 + _MARGIN) * twin.pole_radius).any(axis=0))
+    distances = np.full(away.shape[:2], np.nan)
+    if not len(near):
+        return distances
+    found, _ = batch.ray(start[:, None, :], away[:, near], geomgroup=_GROUPS, ids=ids)
     distance = np.where(found < 0.0, np.nan, found)
     if noise is not None:
-        distance = distance + twin.scanner_noise * noise
+        distance = distance + twin.scanner_noise * noise[:, near]
     if twin.scanner_resolution > 0.0:
         distance = np.round(distance / twin.scanner_resolution) * twin.scanner_resolution
     distance[~((distance >= twin.scanner_nearest) & (distance <= twin.scanner_range))] = np.nan
-    return distance
+    distances[:, near] = distance
+    return distances
 
 
 def detect(twin: Twin, distances: Array) -> tuple[float, float]:
@@ -137,9 +153,12 @@ def detect(twin: Twin, distances: Array) -> tuple[float, float]:
 def rotation(quaternions: Array) -> Array:
     """Rotation matrices of unit quaternions (w, x, y, z), shape (..., 4) to (..., 3, 3)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternions), -1, 0)
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    rows = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    turn = np.empty((*w.shape, 3, 3))
+    for i, j in np.ndindex(3, 3):
+        turn[..., i, j] = rows[i][j]
+    return turn

@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import mujoco
@@ -22,8 +22,9 @@ from chilopod.engine.contract import Marks
 from chilopod.engine.saved import part
 from chilopod.frozen import Array
 from chilopod.record import Recording, Samples, check_size, quantity, walk_record
+from chilopod.robot import Robot
 from chilopod.twin.failures import failures
-from chilopod.twin.legs import servo_targets
+from chilopod.twin.legs import servo_targets, twin_of
 from chilopod.twin.model import AWAY, SIDES, Edit, TwinModel, compiled, silence, without_springs
 from chilopod.twin.scanner import Scanner, rotation
 
@@ -94,6 +95,7 @@ class TwinWalk(BatchWalk):
         self._leg_yaw = Ramps(np.zeros((count, 2)))
         self._tick = 0
         self._status = np.full(count, Status.WALKED, dtype=object)
+        self._gone = np.zeros(count, dtype=np.bool_)  # robots that no longer walk
         self._servos_from, self._servos = 0, np.empty((0, plan.leg_controls.size))
         self._seen: list[Array] = []
 
@@ -139,7 +141,7 @@ class TwinWalk(BatchWalk):
         self._put_poles()
 
     def halt(self, which: Marks) -> None:
-        self._status[as_marks("which", which, len(self._robots)) & ~self._gone] = Status.HALTED
+        self._mark(as_marks("which", which, len(self._robots)) & ~self._gone, Status.HALTED)
 
     def states(self) -> Array:
         states = np.hstack([self._batch.bind("qpos"), self._batch.bind("qvel")])
@@ -167,7 +169,7 @@ class TwinWalk(BatchWalk):
             self._seeds[ids] = as_seeds(seeds)
         self._actuators.restart(marked)
         self._leg_yaw.restart(marked)
-        self._status[marked] = Status.WALKED
+        self._mark(marked, Status.WALKED)
         self._scanner.restart(ids, anew=seeds is not None)
         self._put_poles()
 
@@ -216,7 +218,8 @@ class TwinWalk(BatchWalk):
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         super().restore(settings, arrays)
-        self._tick, self._status[:] = operator.index(settings["tick"]), [Status[name] for name in settings["status"]]
+        self._tick = operator.index(settings["tick"])
+        self._mark(slice(None), [Status[name] for name in settings["status"]])
         for name in _STATE:
             self._batch.bind(name)[:] = arrays[f"state_{name}"]
         for name, samples in self._kept.items():
@@ -277,10 +280,10 @@ class TwinWalk(BatchWalk):
         plan = self._plan
         self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * self._factors
 
-    @property
-    def _gone(self) -> Marks:
-        """Mask of the robots that no longer walk."""
-        return np.asarray(self._status != Status.WALKED, dtype=np.bool_)
+    def _mark(self, which: Any, status: Any) -> None:
+        """Set the status of some robots."""
+        self._status[which] = status
+        self._gone[:] = self._status != Status.WALKED
 
     @property
     def _walking(self) -> NDArray[np.intp]:
@@ -314,14 +317,14 @@ class TwinWalk(BatchWalk):
         at = self._sampling.steps(samples) - first - 1
         for name, store in kept.items():
             if samples.size:
-                store.grown(samples[-1] + 1)[np.ix_(samples, walking)] = np.swapaxes(out[name][:, at], 0, 1)
+                store.grown(samples[-1] + 1)[samples[0] :, walking] = np.swapaxes(out[name][:, at], 0, 1)
         if self._tick == 0 and "sensordata" in kept:  # forces are of the step before, at time 0 of the step after
             start = self._sampling.count(0)
             kept["sensordata"].grown(start)[:start, walking] = out["sensordata"][:, 0]
         warned = batch.warning[walking].any(axis=tuple(range(1, batch.warning.ndim)))
         found = failures(out["qpos"], out["qvel"], before, plan.yaw_positions, warned)
         for row, (step, status) in found.items():
-            self._status[walking[row]] = status
+            self._mark(walking[row], status)
             for store in kept.values():
                 store.grown(0)[samples[at >= step], walking[row]] = np.nan
         if found:
@@ -352,9 +355,7 @@ class TwinWalk(BatchWalk):
         """Servo targets of all hips and knees, shape (ticks, legs times 2)."""
         if ticks[-1] >= self._servos_from + len(self._servos):
             self._servos_from = int(ticks[0])
-            ahead = np.arange(ticks[0], ticks[0] + max(len(ticks), _TARGETS_AHEAD))
-            targets = servo_targets(self._plan.robot, ahead * self._plan.twin.control_interval)
-            self._servos = targets.reshape(len(ahead), -1)
+            self._servos = _targets(self._plan.robot, self._servos_from, max(len(ticks), _TARGETS_AHEAD))
         return self._servos[ticks - self._servos_from]
 
 
@@ -362,6 +363,14 @@ def state_size(plan: TwinModel, initial: ArrayLike | None) -> int:
     """Length of a state: MuJoCo's ``qpos``, followed by ``qvel`` if given."""
     both = plan.model.nq + plan.model.nv
     return both if initial is not None and as_array("initial", initial).shape[-1:] == (both,) else plan.model.nq
+
+
+@lru_cache(maxsize=32)
+def _targets(robot: Robot, first: int, count: int) -> Array:
+    """Servo targets of all hips and knees from a tick on, (count, legs times 2), shared between walks and not to be
+    written into."""
+    targets = servo_targets(robot, np.arange(first, first + count) * twin_of(robot).control_interval)
+    return targets.reshape(count, -1)
 
 
 def _heading(turn: Array) -> Array:
