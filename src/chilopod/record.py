@@ -243,19 +243,21 @@ def quantity(name: str, values: Any) -> tuple[tuple[str, ...], Any, dict[str, st
     return over[-values.ndim :], values, {"units": unit}
 
 
-def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None) -> None:
-    """Add status and target to a record, and set the samples after a robot's failure to NaN.
+def add_outcome(data: xr.Dataset, found: dict[str, Any], statuses: Sequence[str], target: Array | None) -> None:
+    """Add variables, status and target to a record, and set the samples after a robot's failure to NaN.
 
     Parameters
     ----------
     data
-        Record of :func:`walk_record` with all other variables; changed in place.
+        Record of :func:`walk_record`; changed in place.
+    found
+        All other variables.
     statuses
         Labels, one a robot.
     target
         m, shape (robots, 2), (times, robots, 2) if they moved, or None.
     """
-    found: dict[str, Any] = {"status": ("robot", np.array(statuses, dtype=object))}
+    found = {**found, "status": ("robot", np.array(statuses, dtype=object))}
     if target is not None:
         over = ("time", "robot", "axis")[3 - target.ndim :]
         found["target"] = (over, target.copy(), {"units": "m"})

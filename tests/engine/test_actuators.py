@@ -84,8 +84,8 @@ def test_what_is_asked_for_and_what_is_done_are_both_known_afterwards():
 
     actuators = Actuators([FREE.override("springs.softest", 1.0)])
     told(actuators, 0.5, 0.25, within=0.5)
-    data = xr.Dataset(coords={"time": np.array([0.0, 0.5, 0.75, 1.0, 2.0])})
-    actuators.add_to(data)
+    times = np.array([0.0, 0.5, 0.75, 1.0, 2.0])
+    data = xr.Dataset(actuators.recorded(times), coords={"time": times})
     assert data.command_stiffness.values[0, 0, 0] == 0.25
     np.testing.assert_allclose(
         data.stiffness.values[:, 0, 0], [START, START, 0.5 * (START + 1.0), 1.0, 1.0], rtol=1e-12

@@ -12,7 +12,7 @@ tau, tau k' = u - k::
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,10 +24,6 @@ from chilopod.errors import ParameterError
 from chilopod.frozen import Array
 from chilopod.record import LARGEST, LONGEST, quantity
 from chilopod.robot import Robot
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 SINCE, FROM, SLOPE, UNTIL, GOAL, RAMPING, SETTLING = range(7)
 """Rows of :attr:`Actuators.profile`: time of the command (s), start of the ramp (N*m/rad), its slope (N*m/rad/s), its
@@ -104,7 +100,7 @@ class Ramps:
 
 class Actuators:
     """Springs, leg yaw and torques of a batch of robots under commands; with ``keep`` the setpoints are logged, for
-    :meth:`add_to`.
+    :meth:`recorded`.
 
     ``joint_torque`` is the commanded one, N*m, shape (robots, N-1); ``profile`` the stiffness over time since the last
     command, the rows named above, shape (7, robots, N-1); ``lag`` that of the springs' actuators, s, shape (robots,
@@ -196,13 +192,13 @@ class Actuators:
         """Rate of the stiffness of every spring at a time after the last command, N*m/rad/s, shape (robots, N-1)."""
         return _rate(self.profile, self.lag, time)
 
-    def add_to(self, data: xr.Dataset) -> None:
-        """Add setpoints and springs to a record, in place; springs over time if any spring is adjustable."""
+    def recorded(self, times: Array) -> dict[str, Any]:
+        """Setpoints and springs as variables of a record of these times; springs over time if any is adjustable."""
         found = {name: self._logged(name) for name in (self._log[0] if self._log else ())}
         if not self.adjustable:
             found.pop("command_stiffness", None)
-        found["stiffness"] = self._stiffness_over(data.time.values) if self.adjustable else self._start.copy()
-        data.update({name: quantity(name, values) for name, values in found.items()})
+        found["stiffness"] = self._stiffness_over(times) if self.adjustable else self._start.copy()
+        return {name: quantity(name, values) for name, values in found.items()}
 
     def leg_yaw_over(self, times: Array) -> Array:
         """Leg yaw on its ramps at any rising times of the walk, rad, shape (times, robots, 2)."""

@@ -137,7 +137,8 @@ class BatchWalk(Walk):
             self._time, bearing, distance, joint_angles, actuators.leg_yaw.copy(), actuators.stiffness(self._time)
         )
 
-    def _finish(self, data: xr.Dataset, times: Array) -> None:
-        """Add outcome, target and attributes to a record that has everything else."""
-        add_outcome(data, [each.label for each in self.status], self._targets.recorded(times))
+    def _finish(self, data: xr.Dataset, times: Array, found: dict[str, Any]) -> None:
+        """Add other variables, those of the actuators, outcome, target and attributes to a record of motion."""
+        found = self._actuators.recorded(times) | found
+        add_outcome(data, found, [each.label for each in self.status], self._targets.recorded(times))
         data.attrs = {"engine": self.traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}

@@ -273,11 +273,11 @@ class PlanarWalk(BatchWalk):
         times = np.arange(len(states)) / rate
         leg_yaw = self._actuators.leg_yaw_over(times)
         data = planar_record(self._models[0], times, states, leg_yaw).copy(deep=copy)
-        self._actuators.add_to(data)
+        forces = {}
         if self._record and self._record.forces:
             acting = self._actuators.leg_yaw_commanded(times)
-            data["foot_force"] = foot_forces(self._models, times, states, acting, self._friction)
-        self._finish(data, times)
+            forces["foot_force"] = foot_forces(self._models, times, states, acting, self._friction)
+        self._finish(data, times, forces)
         data.attrs["tolerance"] = self._tolerance
         return data
 

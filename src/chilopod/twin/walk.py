@@ -248,11 +248,11 @@ class TwinWalk(BatchWalk):
             joint_rate=rates[..., plan.yaw_rates],
             leg_yaw=positions[..., plan.leg_yaw_positions],
         )
-        self._actuators.add_to(data)
+        found = {}
         if self._seen and self._targets.recorded(times) is not None:
             seen = np.array(self._seen)
-            data["seen_bearing"] = quantity("seen_bearing", seen[:, 0])
-            data["seen_distance"] = quantity("seen_distance", seen[:, 1])
+            found["seen_bearing"] = quantity("seen_bearing", seen[:, 0])
+            found["seen_distance"] = quantity("seen_distance", seen[:, 1])
         if self._record and self._record.forces:
             known = self._kept["sensordata"].rows[:count]
             forces = np.full((count, *known.shape[1:]), np.nan)  # at time 0 they are those of a step that is to come
@@ -260,11 +260,11 @@ class TwinWalk(BatchWalk):
             # The sensor gives the force of the foot on the floor.
             forces = -forces.reshape(*forces.shape[:2], plan.robot.body.modules, len(SIDES), 3)
             data.coords["module"] = np.arange(1, plan.robot.body.modules + 1)
-            data["foot_force"] = quantity("foot_force", forces[..., :2])
-            data["foot_load"] = quantity("foot_load", forces[..., 2])
+            found["foot_force"] = quantity("foot_force", forces[..., :2])
+            found["foot_load"] = quantity("foot_load", forces[..., 2])
         if self._record and self._record.poses:
-            data["pose"] = quantity("pose", positions)
-        self._finish(data, times)
+            found["pose"] = quantity("pose", positions)
+        self._finish(data, times, found)
         return data
 
     # -- inside
