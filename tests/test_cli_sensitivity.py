@@ -1,10 +1,13 @@
 """`chilopod sensitivity` as a user and as a hostile user meet it."""
 
 import json
+from itertools import permutations
 
 import pytest
 
+from chilopod import load_robot
 from chilopod.analysis.parameters import stiffness
+from chilopod.cli.studies import _tolerances
 from helpers.command_line import remarks, run
 
 PRESET = "aoi2022-planar"
@@ -42,6 +45,15 @@ def test_tolerances_of_a_group_of_springs_that_differ():
     assert [each["tolerance_si"] for each in found.values()] == pytest.approx([stiffness(8.2), stiffness(12.0)])
 
 
+def test_the_tolerance_of_a_number_goes_before_those_of_its_group_and_of_all():
+    tolerances = "10%", "springs.stiffness[1:]=4%", "springs.stiffness[2]=2%"
+    found = [_tolerances(load_robot(PRESET), "springs.stiffness[0]", [*each]) for each in permutations(tolerances)]
+    assert all([*each.items()] == [*found[0].items()] for each in found)
+    shares = [found[0][f"springs.stiffness[{i}]"] / stiffness(41.0) for i in range(1, 5)]
+    assert shares == pytest.approx([0.04, 0.02, 0.04, 0.04])
+    assert found[0]["body.mass"] == pytest.approx(0.1 * load_robot(PRESET).body.mass)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -52,6 +64,26 @@ def test_tolerances_of_a_group_of_springs_that_differ():
         (("--uncertain", "x%"), "must be a share"),
         (("--uncertain", "body.mass=0 kg"), "--uncertain = 'body.mass=0 kg': must be positive"),
         (("--uncertain", "body.mass=1%", "--uncertain", "body.mass=2%"), "must be given once"),
+        (("--uncertain", "1%", "--uncertain", "2%"), "--uncertain = '2%': must be given once"),
+        (
+            ("--uncertain", "springs.stiffness[1:]=1%", "--uncertain", "springs.stiffness[2:4]=2%"),
+            "must be given once; allowed: one tolerance of springs.stiffness[2]",
+        ),
+        (("--samples", "32"), "--samples = 32: goes with --uncertain only"),
+        (("--seed", "0"), "--seed = 0: goes with --uncertain only"),
+        (("--show", ""), "--show = '': is not known"),
+        (
+            ("--show", "coefficient", "--set", "gait.side_phase=170 deg"),
+            "N*mm/deg': the onset has no cubic coefficient: its kind is transcritical",
+        ),
+        (
+            ("--show", "radius", "--at", "4 N*mm/deg"),
+            "springs.stiffness[0] = '4 N*mm/deg': the curved walk bends a joint by more than a right angle",
+        ),
+        (
+            ("--show", "radius", "--parameter", "springs.stiffness", "--at", "6 N*mm/deg"),
+            "error: springs.stiffness = '6 N*mm/deg to 77.44 N*mm/deg': the straight walk has no pitchfork",
+        ),
         (("--uncertain", "body.mas=10%"), "did you mean 'body.mass'?"),
         (("--uncertain", "body.mass=1 cm"), "is a length"),
         (("--uncertain", "inf%"), "--uncertain = 'inf%': must be a share above 0 % and below 100 %"),

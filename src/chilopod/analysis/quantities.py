@@ -234,7 +234,7 @@ class Measured:
         """A quantity of a robot; AnalysisError also where it is one of a curved walk at which engines end."""
         value = float(getattr(self, name)(robot))
         if name in _OF_WALKS and self.growth(robot) > 0.0 and self.most_bent(robot) > MOST_BENT:
-            raise AnalysisError(TOO_BENT, field=name)
+            raise AnalysisError(TOO_BENT, **self._place(robot))
         return value
 
     def error(self, name: str, robot: Robot) -> float:
@@ -270,10 +270,14 @@ class Measured:
 
     def coefficient(self, robot: Robot) -> float:
         """Cubic coefficient of the normal form at the onset, 1/rad^2."""
-        found = self.number.first(robot, normal_form=True).coefficient
-        if found is None:
-            raise AnalysisError("has no coefficient of a normal form", field="coefficient")
-        return found
+        found = self.number.first(robot, normal_form=True)
+        if found.coefficient is None:
+            kind, place = (
+                found.point.kind.label,
+                self._place(robot.with_value(self.number.parameter, found.point.value)),
+            )
+            raise AnalysisError(f"the onset has no cubic coefficient: its kind is {kind}", **place)
+        return found.coefficient
 
     def growth(self, robot: Robot) -> float:
         """Growth rate of the leading mode of the straight walk, 1/s."""
@@ -335,9 +339,10 @@ class Measured:
         """State at time 0 of the curved walk that leaves the straight one at the onset, shape (2N+1,); AnalysisError if
         the robot walks straight, or the branch does not reach it."""
         if self.growth(robot) <= 0.0:
-            path = self.number.parameter
-            value = units.format(robot.get(path), robot.unit_of(path), digits=4)
-            raise AnalysisError("the straight walk is stable there: nothing curves", field=path, value=value)
+            allowed = (
+                "a value at which it is unstable; `chilopod branch` finds curved walks beside a stable straight one"
+            )
+            raise AnalysisError("the straight walk is stable there", **self._place(robot), allowed=allowed)
         model = PlanarModel(robot, use_symmetry=False)
         found = None if self.near is None else _corrected(model, *self.near)
         if found is None:
@@ -346,6 +351,11 @@ class Measured:
             found = state, np.asarray(np.linalg.inv(slope), dtype=np.float64)
         self.near = found
         return found[0]
+
+    def _place(self, robot: Robot) -> dict[str, str]:
+        """Path of the number and its value, for an error."""
+        path = self.number.parameter
+        return {"field": path, "value": units.format(robot.get(path), robot.unit_of(path), digits=4)}
 
     def _means(self, robot: Robot) -> WalkMeans:
         if self._last is None or self._last[0] != robot:
@@ -358,7 +368,12 @@ class Measured:
         self.branches += 1
         path, (low, high) = self.number.parameter, self.number.interval(robot)
         at = robot.get(path)
-        walks = curved_walks(robot, path, (low, at) if self.number.rises(robot) else (at, high))
+        try:
+            walks = curved_walks(robot, path, (low, at) if self.number.rises(robot) else (at, high))
+        except AnalysisError as error:
+            if str(error.field).startswith("between"):  # an interval that nobody gave
+                error.field, error.allowed = path, "a number that bends this robot by a pitchfork"
+            raise
         if float(walks.parameter_si[-1]) != at:
             raise AnalysisError(f"has no curved walk there: the branch ends, {walks.attrs['ending']}", field=path)
         state = np.asarray(find_orbit(model, walks.orbit.values[-1]).state)

@@ -43,8 +43,11 @@ def sensitivity(
             '"ground.friction=20%"; may be repeated.',
         ),
     ] = None,
-    samples: Annotated[int, typer.Option(metavar="N", min=16, help="Samples with --uncertain, a power of two.")] = 128,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the samples.")] = 0,
+    samples: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=16, help="Samples with --uncertain, a power of two.", show_default="128"),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", min=0, help="Seed of the samples.", show_default="0")] = None,
 ) -> None:
     """Effect of each number of a robot on where it bends: derivatives with respect to every number of its file.
 
@@ -57,17 +60,20 @@ def sensitivity(
     described = options.described
     onset = options.number(at)
     tolerances = _tolerances(described, options.parameter, uncertain or [])
-    for option, text in (("show", show), ("at", at)):
-        if tolerances and text:
-            raise ParameterError("goes without --uncertain only", field=option, value=text, allowed="the onset alone")
+    for option, given in (("show", show), ("at", at)):
+        if tolerances and given is not None:
+            raise ParameterError("goes without --uncertain only", field=option, value=given, allowed="the onset alone")
+    for option, number in (("samples", samples), ("seed", seed)):
+        if not tolerances and number is not None:
+            raise ParameterError("goes with --uncertain only", field=option, value=number)
     from chilopod import analysis
     from chilopod.analysis.sensitivity import DEFAULT
 
     if tolerances:
-        given = described, tolerances, onset, samples, seed
-        options.study("uncertainty", lambda progress: analysis.uncertainty(*given, progress))
+        how = described, tolerances, onset, 128 if samples is None else samples, seed or 0
+        options.study("uncertainty", lambda progress: analysis.uncertainty(*how, progress))
     else:
-        names = show.split(",") if show else DEFAULT
+        names = DEFAULT if show is None else show.split(",")
         options.study("sensitivity", lambda progress: analysis.sensitivity(described, onset, names, progress=progress))
 
 
@@ -106,13 +112,14 @@ def compare(
 
 
 def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, float]:
-    """Tolerances by path, SI; a share of all numbers leaves out those that are zero and that which varies."""
+    """Tolerances by path, SI; that of a number goes before that of its group, and both before a share of all numbers,
+    which leaves out those that are zero and that which varies."""
     from chilopod import units
     from chilopod.analysis.parameters import check_parameter, numbers_read
     from chilopod.robot.parameters import place_of
 
     found: dict[str, float] = {}
-    named: set[str] = set()
+    width: dict[str, int] = {}  # of what a tolerance was given for: number, group, all
     others = [path for path in numbers_read(robot) if parameter not in (path, path.partition("[")[0])]
     for text in given:
         path, equals, tolerance = (each.strip() for each in text.partition("="))
@@ -122,19 +129,22 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
                 raise ParameterError("must be a share above 0 % and below 100 %", value=text)
             if equals:
                 check_parameter(robot, path)
-                if path in named:
-                    raise ParameterError("must be given once", value=text)
                 if path == parameter:
                     raise ParameterError("must not be the number whose critical value is searched", value=text)
-                named.add(path)
                 stem, joints = path.partition("[")[0], place_of(path).joints(robot.body.modules - 1)
                 paths = [each for each in others if each in [f"{stem}[{i}]" for i in joints]] or [path]
             elif share is not None:
-                paths = [each for each in others if robot.get(each) and each not in found]
+                paths = [each for each in others if robot.get(each)]
             else:
                 said = "must be a share, or a number with its tolerance"
                 raise ParameterError(said, value=text, allowed="10%, body.mass=0.3 kg")
+            wide = 2 if not equals else int(len(paths) > 1)
             for each in paths:
+                if width.get(each) == wide:
+                    raise ParameterError("must be given once", value=text, allowed=f"one tolerance of {each}")
+                if width.get(each, wide) < wide:
+                    continue
+                width[each] = wide
                 if share is None:
                     found[each] = units.parse(tolerance, robot.si_unit_of(each))
                     if not found[each] > 0.0:
@@ -143,7 +153,7 @@ def _tolerances(robot: Robot, parameter: str, given: list[str]) -> dict[str, flo
                     raise ParameterError(f"{each} is 0, which has no share", value=text, allowed=f"{each}=VALUE")
                 else:
                     found[each] = share * abs(robot.get(each))
-    return found
+    return {each: found[each] for each in (*others, *found) if each in found}  # however they were given
 
 
 def _share(text: str) -> float | None:

@@ -57,8 +57,8 @@ CHARTS = {
     ),
     "C": Chart(
         ("gait.module_phase", "60 deg", "180 deg"),
-        "The phase between modules hardly moves the onset, from {least} to {most} N·mm/deg. It decides whether the "
-        "onset is gentle or sudden.",
+        "From 60° to 180° the phase between modules hardly moves the onset, from {least} to {most} N·mm/deg. It "
+        "decides whether the onset is gentle or sudden.",
     ),
     "D": Chart(
         ("modules", 3, 16),
