@@ -1,6 +1,7 @@
 """Every crossing in the interval is found, none is invented, and each lies within its error bound."""
 
 import contextlib
+import math
 import time
 from math import pi
 
@@ -328,6 +329,53 @@ def test_a_point_among_the_symmetric_orbits_of_a_ring(cells, low):
     (point,) = found
     assert abs(point.value - 0.1342679520115237) <= point.error_bound + 1e-15
     assert point.error_bound < 1e-9
+
+
+def coupled(k, size):
+    """Two Stuart-Landau oscillators: the difference of their phases has the exponent -2 k."""
+
+    def rhs(t, z):
+        a, b, c, d = (each / size for each in z)
+        first, second = 1.0 - a * a - b * b, 1.0 - c * c - d * d
+        one = size * (first * a - b + k * (c - a)), size * (first * b + a + k * (d - b))
+        return [*one, size * (second * c - d + k * (a - c)), size * (second * d + c + k * (b - d))]
+
+    return from_rhs(rhs, 4, None, guess_period=6.28)
+
+
+@pytest.mark.parametrize("size", [1.0, 3.0, 1e6])
+def test_a_multiplier_that_is_one_at_a_sampled_value_passes_it_in_all_units(size):
+    found = locate(lambda k: coupled(k, size), (-0.4, 0.4), orbit=[size, 0.0, size, 0.0], normal_form=False)
+    assert found.status is SearchStatus.COMPLETE
+    (point,) = found
+    assert abs(point.value) <= point.error_bound < 1e-9
+
+
+@pytest.mark.parametrize("rounding", [-3e-16, 0.0, 3e-16])
+def test_rounding_does_not_decide_on_which_side_of_one_a_multiplier_is(rounding):
+    """The middle of the interval is sampled, and there one of the multipliers is +1 but for rounding."""
+
+    def family(k):
+        slow, fast = math.exp(-4.0 * math.pi * k) + rounding, 1e-3 * math.exp(k)
+        return from_map(lambda z: ([fast * z[0], slow * z[1]], [[fast, 0.0], [0.0, slow]]), 2)
+
+    found = locate(family, (-0.4, 0.4), orbit=[0.0, 0.0], normal_form=False)
+    assert found.status is SearchStatus.COMPLETE
+    assert [abs(point.value) < 1e-12 for point in found] == [True]
+
+
+@pytest.mark.parametrize("rounding", [-3e-16, 0.0, 3e-16])
+def test_an_orbit_that_meets_another_at_a_sampled_value_ends_there(rounding):
+    """x -> x - k x - x^3: the orbit sqrt(-k) ends at 0, and the orbit 0 goes on with multiplier 1 - k."""
+
+    def family(k):
+        growth = 1.0 - k + rounding
+        return from_map(lambda x: ([growth * x[0] - x[0] ** 3], [[growth - 3.0 * x[0] ** 2]]), 1)
+
+    found = locate(family, (-0.4, 0.4), orbit=[math.sqrt(0.4)], normal_form=False)
+    assert found.status is SearchStatus.INCOMPLETE
+    assert -1e-3 < found.searched[1] < 0.0
+    assert "another orbit meets it" in found.ending
 
 
 def close(distance):

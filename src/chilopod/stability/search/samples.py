@@ -49,6 +49,7 @@ _ATTEMPTS = 24  # largest number of steps to a value from the sample beside it: 
 _JUMP = 0.3  # difference of prediction and correction, relative to the orbit's size, that counts as a jump
 _FORESEEN, _SMALL = 0.3, 0.01  # largest errors of a prediction, relative to the orbit's change and to the sizes
 _SAME = 1e-7  # error of a prediction, relative to the sizes, below which a correction gains nothing
+_ROUNDING = 1e-14, 1e-7  # least and largest error of multipliers, which is otherwise that of the first return
 _HALFWAY = 0.25  # largest distance of an orbit halfway from the mean of its neighbours, relative to their distance
 _TO_EVENT, _TOGETHER = 24, 1e-4  # halvings of the way to where events change, and distance of orbits there: its root
 _HALVED, _CLOSER = 13, 0.75  # halvings of a gap with a multiplier +1, and factor of each on its orbits' distance
@@ -91,6 +92,8 @@ class Samples:
             self.first = searched_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
             events = events_in(self.family(low), self.first.state, self.first.period)
+        error = np.nan_to_num(self.first.image.error, posinf=1.0) * self.size / self.size[:, None]
+        self._rounding = float(np.clip(error.max(), *_ROUNDING))  # which decides the side so close to +1
         self.budget.left, self.budget.taken = allowed, 0.0  # without the first orbit
         self.known = guess is None and self.family.timed
         if not self.known:
@@ -244,33 +247,36 @@ class Samples:
 
     def _up_to_merging(self, path: list[Sample]) -> list[Sample]:
         """The path up to a pitchfork where the orbit meets another one: a multiplier comes to +1 and turns back."""
-        i = 1
-        while i < len(path) - 2:
-            if not _touches(*path[i - 1 : i + 3]):
+        i, end, sided = 1, path[-1].value, [each for each in path if each.off_plus_one > self._rounding]
+        while i < len(sided) - 2:
+            if not _touches(sided[i - 1 : i + 3]):
                 i += 1
                 continue
-            gap = path[i + 1].value - path[i].value
+            gap = sided[i + 1].value - sided[i].value
             try:
-                found = None if gap <= _MERGED * self.width else self._nearer(path[: i + 1], path[i + 1])
+                found = None if gap <= _MERGED * self.width else self._nearer(sided[: i + 1], sided[i + 1])
             except SpentError:
                 break
             if found is not None:
                 self._keep(found)
-                path.insert(i + 1, found)
+                sided.insert(i + 1, found)
                 i = max(i - 1, 1)
-            elif gap <= _NEAR_MERGED * self.width and path[i + 1].value not in self._steep:
-                self.merges, self.fold = True, None  # H - 1 is singular where they meet
-                return path[: i + 1]
+            elif gap <= _NEAR_MERGED * self.width and sided[i + 1].value not in self._steep:
+                self.merges, self.fold, end = True, None, sided[i].value  # H - 1 is singular where they meet
+                break
             else:
                 i += 1
-        return path
+        return [each for each in sorted({*path, *sided}, key=lambda each: each.value) if each.value <= end]
 
     def _nearer(self, behind: list[Sample], ahead: Sample) -> Sample | None:
-        """Sample between the last one and another, in the middle or nearer to the last; None if there is none."""
+        """Sample between the last one and another, in the middle or nearer to the last; None if there is none. Its
+        multipliers are off +1."""
         for part in (0.5, 0.25, 0.125, 0.0625):
             value = behind[-1].value + part * (ahead.value - behind[-1].value)
             with contextlib.suppress(AnalysisError):
-                return self._sampled(value, self._predicted(behind[: -_BEHIND - 1 : -1], value), behind[-1])
+                found = self._sampled(value, self._predicted(behind[: -_BEHIND - 1 : -1], value), behind[-1])
+                if found.off_plus_one > self._rounding:
+                    return found
         return None
 
     def _followed(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
@@ -338,7 +344,7 @@ class Samples:
             return False
         first, left = behind
         off = _on_one_side([first, left, found])
-        if off is None or not (off > -1.0).all():
+        if off is None or not (off > -1.0).all() or np.abs(off).min() <= self._rounding:
             return False
         rates = np.log1p(off)
         ahead = rates[1] + (rates[1] - rates[0]) * (found.value - left.value) / (left.value - first.value)
@@ -415,12 +421,12 @@ def _in_time(samples: list[Sample], found: Sample) -> bool:
     return off <= max(_FORESEEN * float(np.ptp([*times[:2], duration])), _SMALL * duration)
 
 
-def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
+def _touches(samples: list[Sample]) -> bool:
     """True if a multiplier on one side of +1 approaches it from both sides of the gap between two of four samples."""
-    off = _on_one_side([first, left, right, last])
+    off = _on_one_side(samples)
     if off is None:
         return False
-    places, off = np.array([each.value for each in (first, left, right, last)]), np.abs(off)
+    places, off = np.array([each.value for each in samples]), np.abs(off)
     into, out = np.diff(off)[[0, 2]] / np.diff(places)[[0, 2]]
     if not into < 0.0 < out:
         return False
