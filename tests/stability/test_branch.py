@@ -233,6 +233,32 @@ def turning(angle):
     return from_map(lambda x: (turn @ [x[0], x[1] + x[0] ** 3], turn @ [[1.0, 0.0], [3.0 * x[0] ** 2, 1.0]]), 2)
 
 
+@pytest.mark.parametrize("size", [1.0, 1e6])
+def test_the_place_of_a_collision_where_orbits_meet(size):
+    """Orbits (pi +- w, +-2 w) of two periods of the standard map, K = 4 w / sin w, lose a symmetry at w = pi/2."""
+
+    def family(strength):
+        def image(z):
+            (x, p), derivative = np.asarray(z) / size, np.eye(2)
+            for _ in range(2):
+                slope = strength * np.cos(x)
+                p = p + strength * np.sin(x)
+                x = x + p
+                derivative = np.array([[1.0 + slope, 1.0], [slope, 1.0]]) @ derivative
+            return [size * x, size * p], derivative
+
+        return from_map(image, 2)
+
+    low = 5.8 / np.sin(1.45)
+    guess = [size * (np.pi + 1.45), size * 2.9]
+    (point,) = follow(family, guess, (low, 6.6)).special_points
+    (found,) = locate(family, (low, 6.6), orbit=guess)
+    assert point.special is found.kind is Kind.COLLISION
+    assert abs(point.value - 2.0 * np.pi) <= point.bifurcation.error_bound < 1e-9
+    assert abs(found.value - 2.0 * np.pi) <= found.error_bound < 1e-9
+    assert point.error_bound < 1e-5
+
+
 def test_no_direction_is_made_up_at_a_collision_that_determines_none():
     (meeting,) = locate(turning, (2.5, 4.0), orbit=[0.0, 0.0])
     (special,) = follow(turning, begin(turning, 2.5, [0.0, 0.0]), (2.5, 4.0)).special_points

@@ -236,13 +236,12 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     """Place and orbit at a multiplier +1, where H - 1 is singular and Newton's method stops anywhere along the mode.
 
     The orbit and a test function are interpolated from regular places on both sides, or on one side at an end, ever
-    closer together until interpolations of two orders agree. The test function of one multiplier is det(H' - 1); that
-    of several that cross together, as a symmetry makes them do, is their mean distance from +1. None if the orbit is
-    regular, there is no room, or another multiplier is as near +1.
+    closer together until interpolations of two orders agree. The test function of one multiplier, or of two that meet,
+    is det(H' - 1); that of several that cross together, as a symmetry makes them do, is their mean distance from +1.
+    None if the orbit is regular, there is no room, or another multiplier is as near +1.
     """
-    count = crossing.multiplicity
-    together = count == 1 or abs(crossing.change) == count
-    if crossing.event is not CircleEvent.PLUS or not together or crossing.collision:
+    count, smooth = crossing.multiplicity, _is_smooth(crossing)
+    if crossing.event is not CircleEvent.PLUS or not (smooth or abs(crossing.change) == count):
         return None
     tried: list[tuple[float, float, _Interpolation]] = []
     for nodes, reach in _nodes(course, crossing.value):
@@ -264,11 +263,8 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     distances, errors = distances[order], spec.error[order]
     if distances[count - 1] > _TOGETHER * distances[count:].min(initial=np.inf):
         return None  # the polynomials do not separate two crossings
-    errors[:count] += distances[:count]  # rounding at the places, larger than at the zero where another one is near
-    if count > 1:
-        uncertain = float(errors[:count].max())
-    else:
-        uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(errors)))
+    errors += distances  # rounding at the places, larger than at the zero where another one is near
+    uncertain = float(errors.prod() if smooth else errors[:count].max())
     bound += SAFETY * uncertain * reach / found.slope
     return Regular(place, bound, found.orbit, found.orbit_error, reach, orbit)
 
@@ -305,7 +301,7 @@ def _interpolated(course: Course, crossing: Crossing, nodes: Array, reach: float
         beside = course.at(crossing.value + reach * nodes)
     except (AnalysisError, SpentError):
         return None
-    values = np.array([_off_plus_one(spectrum(each.image).values, crossing.multiplicity) for each in beside])
+    values = np.array([_off_plus_one(spectrum(each.image).values, crossing) for each in beside])
     orbits = np.array([each.orbit for each in beside])
     inner = np.abs(nodes) < np.sort(np.abs(nodes))[-2]
     fine, coarse = (Polynomial.fit(x, y, x.size - 1) for x, y in ((nodes, values), (nodes[inner], values[inner])))
@@ -318,12 +314,17 @@ def _interpolated(course: Course, crossing: Crossing, nodes: Array, reach: float
     return _Interpolation(zero, abs(zero - other), abs(float(fine.deriv()(zero))), orbit, off, near)
 
 
-def _off_plus_one(values: ComplexArray, count: int) -> float:
-    """Test function of ``count`` multipliers that pass +1 together, smooth along a course."""
+def _is_smooth(crossing: Crossing) -> bool:
+    """True if det(H' - 1) passes zero where multipliers do, smoothly also where the critical one meets another."""
+    return crossing.multiplicity == 1 or (crossing.collision and crossing.multiplicity == 2)
+
+
+def _off_plus_one(values: ComplexArray, crossing: Crossing) -> float:
+    """Test function of multipliers that pass +1 together, smooth along a course."""
     off = values - 1.0
-    if count == 1:  # the product over all stays smooth where the critical one meets another
+    if _is_smooth(crossing):
         return float(off.prod().real)
-    return float(off[np.abs(off).argsort()[:count]].mean().real)
+    return float(off[np.abs(off).argsort()[: crossing.multiplicity]].mean().real)
 
 
 def _root_near_zero(polynomial: Polynomial, nodes: Array) -> float | None:
