@@ -259,6 +259,18 @@ def test_the_place_of_a_collision_where_orbits_meet(size):
     assert point.error_bound < 1e-5
 
 
+@pytest.mark.parametrize("miss", [0.0, 1e-16, 1e-15, 1e-14, 1e-13])
+def test_a_fold_is_within_the_bound_of_the_pitchfork_that_it_nearly_is(miss):
+    """x -> x + mu x - x^3 + miss: the fold is at 3 (miss/2)^(2/3)."""
+
+    def family(mu):
+        return from_map(lambda x: ([x[0] + mu * x[0] - x[0] ** 3 + miss], [[1.0 + mu - 3.0 * x[0] ** 2]]), 1)
+
+    branch = follow(family, begin(family, 0.5, [-np.sqrt(0.5)], rising=False), (-0.5, 0.5))
+    (point,) = branch.special_points
+    assert abs(point.value - 3.0 * np.cbrt(miss / 2.0) ** 2) <= point.bifurcation.error_bound < 1e-8
+
+
 def test_no_direction_is_made_up_at_a_collision_that_determines_none():
     (meeting,) = locate(turning, (2.5, 4.0), orbit=[0.0, 0.0])
     (special,) = follow(turning, begin(turning, 2.5, [0.0, 0.0]), (2.5, 4.0)).special_points

@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 import copy
 import functools
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyfit
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
@@ -213,19 +215,23 @@ def _value_error(within: Within, place: EventPlace, along: float, image: ReturnM
 
 
 def _turn(within: Within, at: float) -> tuple[float, float]:
-    """The parameter where a curve turns at a branch point, by polynomials through places round it, and its error."""
+    """The parameter where a curve turns at a branch point, by polynomials through places round it, and its error.
+
+    Two curves that miss each other leave a term c/u of the distance u: a u^2 + c/u has a fold at 3 (c/2)^(2/3) a^(1/3).
+    """
     parts = [within.at(at + each * within.step.size) for each in _AROUND]
-    values = np.array([part.moved[-1] for part in parts])
-    turned = []
+    curve, section, values = within.curve, within.step.start.section, np.array([part.moved[-1] for part in parts])
+    images = [curve.image(part.found.x, part.found.value, section, with_error=True) for part in parts]
+    noise = SAFETY * max(_fold_error(curve, part, image) for part, image in zip(parts, images, strict=True))
+    turned, missed, least = [], 0.0, float(np.abs(_AROUND).min()) * noise / curve.scale
     for used in (slice(None), slice(1, -1)):
-        through = Polynomial.fit(_AROUND[used], values[used], values[used].size - 1)
+        miss, *rest = polyfit(_AROUND[used], _AROUND[used] * values[used], values[used].size - 1).tolist()
+        through = Polynomial(rest)
         turns = through.deriv().roots()
         turned.append(float(through(turns[np.abs(turns).argmin()].real)))
-    curve, section = within.curve, within.step.start.section
-    images = [curve.image(part.found.x, part.found.value, section, with_error=True) for part in parts]
-    noise = max(_fold_error(curve, part, image) for part, image in zip(parts, images, strict=True))
-    start, scale = within.step.start.last.value, curve.scale
-    return start + scale * turned[0], scale * abs(turned[0] - turned[1]) + SAFETY * noise
+        missed = max(missed, 3.0 * math.cbrt((0.5 * (abs(miss) + least)) ** 2 * abs(rest[2])))
+    error = curve.scale * (abs(turned[0] - turned[1]) + SAFETY * missed) + noise
+    return within.step.start.last.value + curve.scale * turned[0], error
 
 
 def _noise(curve: Curve, here: Step[Anchor, OnCurve], section: Section | None) -> float:
