@@ -12,10 +12,11 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot, planar, twin
-from chilopod.engine import Command, Event, Status, Targets, steer
+from chilopod.engine import Command, Event, Status, Targets, event_times, steer
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, ThreadError
 from chilopod.planar.walk import TOLERANCE
 from chilopod.record import Recording
+from chilopod.steering import LegYawController
 
 PLANAR, TWIN = load_robot("aoi2022-planar"), load_robot("aoi2022")
 BOTH = pytest.mark.parametrize(("engine", "robot"), [(planar, PLANAR), (twin, TWIN)], ids=["planar", "twin"])
@@ -480,6 +481,12 @@ def test_a_robot_put_on_the_floor_anew_beside_the_beginning_of_a_cycle_leaves_th
         each.command(Command(leg_yaw=(0.1, 0.1)))
         each.advance(4.2 * PLANAR.gait.period)
     np.testing.assert_array_equal(walk.states()[1], once.states()[1])
+
+
+@pytest.mark.parametrize("duration", [float("nan"), float("inf"), -1.0, "1 s"])
+def test_events_are_those_of_a_finite_time(duration):
+    with pytest.raises(ParameterError, match="duration = "):
+        event_times(LegYawController(), PLANAR.gait, duration)
 
 
 def test_events_that_never_end_are_refused():

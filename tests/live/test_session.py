@@ -220,6 +220,24 @@ def test_what_cannot_be_is_said_in_a_line_and_changes_nothing(asked, part):
     assert walking.seen().status is Status.WALKED
 
 
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), -1.0, 2e5, "1 s", None, True])
+def test_walks_on_for_a_time_only(seconds):
+    walking = session()
+    walking.walk_on(0.3)
+    with pytest.raises(ParameterError, match="seconds"):
+        walking.walk_on(seconds)
+    assert walking.seen().time == 0.3
+
+
+def test_a_walk_of_more_than_a_day_goes_on(monkeypatch):
+    """The engines walk no more than 1e5 s at a time."""
+    monkeypatch.setattr("chilopod.live.session._RENEWED", 1.0)
+    walking = session()
+    walking.walk_on(3.0)
+    assert walking.seen().time == pytest.approx(3.0)
+    assert walking.seen().clock < 1.9
+
+
 def test_a_slider_is_one_row_of_a_table():
     begun = session()
     before = begun.settings

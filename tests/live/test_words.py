@@ -32,7 +32,9 @@ def said(session, theory=THEORY, rate=None, **seen):
 
 
 def curve(radius, side=-1.0):
-    return {"mean_angles": side * np.full(5, PLANAR.module_length / radius)}
+    """A body along the circle that it walks on."""
+    angles = side * np.full(5, PLANAR.module_length / radius)
+    return {"mean_angles": angles, "turned": -angles.sum()}
 
 
 def soft(spring):
@@ -92,6 +94,65 @@ def test_a_bend_that_stays_on_its_side_after_undulations_is_a_curve(begun):
         told.append(begun.seen().undulates)
     assert told == [False] * 30 + [True] * 30 + [False]
     assert "swaying from side to side" in said(begun, replace(THEORY, straight=()), **curve(0.4), undulates=True)
+
+
+@pytest.mark.parametrize(
+    ("angles", "turned", "walks"),
+    [
+        (np.full(5, 0.2), -1.0, "a curve of 1.12 m to the right"),  # 5 * 0.225 m / 1 rad
+        (np.full(5, 0.2), -0.3, "on, bent to the right just now"),
+        (np.full(5, 0.2), -9.0, "on, bent to the right just now"),
+        (np.full(5, 0.2), 1.0, "on, bent to the right just now"),
+        (np.full(5, 0.2), np.nan, "on, bent to the right just now"),  # it has not walked its own length
+        (np.array([0.4, 0.4, 0.2, -0.5, -0.3]), -0.2, "on, bent both ways just now"),
+    ],
+)
+@pytest.mark.parametrize("doing", ["walks", "pulled", "steered"])
+def test_a_curve_is_one_where_body_and_path_agree(begun, angles, turned, walks, doing):
+    pulled = {"pulled": np.full(5, 0.1)} if doing == "pulled" else {}
+    steered = {"target": (2.0, 0.0), "steering": "leg-yaw"} if doing == "steered" else {}
+    seen = replace(begun.seen(), mean_angles=angles, turned=turned, **pulled, **steered)
+    (text,) = sentences(seen, begun.settings, Theory(), None)[-1:]
+    assert f"it walks {walks}" in text.replace("It", "it")
+    for theory, spring in ((THEORY, 41.0), (THEORY, 8.0)):
+        text = said(begun, theory, mean_angles=angles, turned=turned, **pulled, **steered, **soft(spring))
+        assert ("curve of 1.12 m" in text or "The curve, 1.12 m" in text) == ("curve" in walks)
+
+
+def test_the_turn_of_the_path_is_that_over_the_length_of_the_axis():
+    """In a gait cycle the robot walks stride / duty; the axis is (N-1) L."""
+    walking = Session(PLANAR)
+    walking.walk_on(1e-9)  # a little more than whole cycles
+    gait = PLANAR.gait
+    back = round(5 * PLANAR.module_length * gait.duty / gait.stride)
+    headings = []
+    for _ in range(back + 8):
+        walking.walk_on(gait.period)
+        headings.append(walking.seen().pose[2])
+        turned = walking.seen().turned
+        known = len(headings) > back
+        expected = headings[-1] - headings[-1 - back] if known else np.nan
+        assert turned == pytest.approx(expected, abs=1e-6, nan_ok=True)
+    walking.box.put(wishes.Reset(2))
+    walking.obey()
+    assert np.isnan(walking.seen().turned)
+
+
+@pytest.mark.parametrize("steered", [False, True])
+def test_a_sway_is_no_curve_from_its_first_swing_on(steered):
+    """All springs soft: its joints bend to both sides."""
+    walking = Session(PLANAR, seed=3, strategy="leg-yaw")
+    walking.box.put(wishes.Spring(None, stiffness(2.05)))
+    if steered:
+        walking.box.put(wishes.Target((11.0, 11.0)))
+    walking.obey()
+    told, bent = "", 0
+    for _ in range(60):
+        walking.walk_on(0.5)
+        told += " ".join(sentences(walking.seen(), walking.settings, Theory(remark="it sways"), None))
+        bent += walking.seen().bend > 0.3
+    assert "curve" not in told
+    assert bent > 40
 
 
 @pytest.mark.parametrize(

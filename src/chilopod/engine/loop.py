@@ -21,6 +21,7 @@ from chilopod.engine.named import foreign
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
+from chilopod.record import LONGEST
 
 Heard = Callable[[Event, Observation, Command], None]
 
@@ -79,6 +80,8 @@ class Referee(Protocol):
 def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:
     """All instants in [0, duration) at which a controller is called, in order; ParameterError or AnalysisError for
     invalid events."""
+    fits, allowed = 0.0 <= as_number("duration", duration) <= LONGEST, f"0 to {LONGEST:g} s"
+    require(fits, "must be a duration in s", "duration", duration, allowed)
     return ((time, event) for time, _, event in _numbered(controller, gait, 0.0, duration))
 
 

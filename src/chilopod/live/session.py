@@ -11,13 +11,13 @@ import xarray as xr
 
 from chilopod.analysis.parameters import ALL
 from chilopod.engine import Command, Controller, Status, Walk, engine_named, steer
-from chilopod.engine.arguments import require
+from chilopod.engine.arguments import as_number, require
 from chilopod.errors import ChilopodError, ParameterError, nearest_name
 from chilopod.frozen import Array
 from chilopod.live import wishes
 from chilopod.live.sliders import Slider, sliders_of
 from chilopod.live.state import Seen, Settings, as_finite, as_seed, as_within, but_springs
-from chilopod.record import Recording
+from chilopod.record import LONGEST, Recording
 from chilopod.robot import Robot
 from chilopod.steering import (
     ARRIVAL_RADIUS,
@@ -45,6 +45,8 @@ _MOST_RECORDS = 100  # of a session
 _MOST_BYTES = 1 << 29  # of all of them, before they are packed
 _MOST_WORDS = 4
 _REMEMBERED = 600  # looks, in which an undulation is sought
+_RENEWED = 0.5 * LONGEST  # s after which a walk goes on as another, as the engines want it
+_BEHIND = 6000  # looks, in which the slowest robot walks its own length
 
 
 class Session:
@@ -101,6 +103,7 @@ class Session:
             self._steering,
             walk.states()[0],
             self._undulates(),
+            self._turned(),
         )
 
     def messages(self) -> list[str]:
@@ -127,7 +130,7 @@ class Session:
 
     def walk_on(self, seconds: float) -> None:
         """Walk on; a robot that has failed stays where it is."""
-        until = self._walk.time + seconds
+        until = self._walk.time + as_within("seconds", as_number("seconds", seconds), (0.0, LONGEST), "s")
         while self._walk.status[0] is Status.WALKED:
             time = self._look_next / LOOKS * self._period
             if time > until:
@@ -167,6 +170,7 @@ class Session:
         self._looks: deque[Array] = deque([self._walk.observe().joint_angles[0]] * LOOKS, maxlen=LOOKS)
         self._bends: deque[float] = deque(maxlen=LOOKS + 1)
         self._left: deque[bool] = deque(maxlen=_REMEMBERED)
+        self._headings: deque[float] = deque(maxlen=_BEHIND)  # of module 1, not wrapped
 
     def _undulates(self) -> bool:
         """True if the bend goes from side to side: it has not stayed on this one for longer than the last whole
@@ -174,6 +178,13 @@ class Session:
         left = np.array(self._left)
         *_, begin, _, end = (0, 0, 0, *(np.flatnonzero(left[1:] != left[:-1]) + 1))
         return bool(begin > 0 and len(left) - end <= end - begin)
+
+    def _turned(self) -> float:
+        """Turn of module 1 while it walked the last length of the axis, in whole gait cycles, rad."""
+        robot = self._walk.robots[0]
+        axis, step = (robot.body.modules - 1) * robot.module_length, robot.gait.stride / robot.gait.duty
+        back = LOOKS * max(1, round(axis / step)) + 1
+        return self._headings[-1] - self._headings[-back] if len(self._headings) >= back else math.nan
 
     def _start(self, robot: Robot, states: Array) -> None:
         if self.settings.recording and (self._recorded >= _MOST_RECORDS or self._bytes >= _MOST_BYTES):
@@ -203,6 +214,8 @@ class Session:
             self._looks.append(angles)
             mean = np.mean(self._looks, axis=0)
             self._bends.append(float(np.abs(mean).sum()))
+            heading, before = float(self._walk.pose()[0, 2]), self._headings[-1] if self._headings else 0.0
+            self._headings.append(before + math.remainder(heading - before, math.tau))
             if self._controller is None and not self._pull.any():
                 self._left.append(bool(mean.sum() < 0.0))
             else:  # who steers or pulls changes sides too
@@ -215,7 +228,7 @@ class Session:
             self.stop_recording()
         wanted = self.settings
         as_wanted = but_springs(wanted.robot) == but_springs(self._walk.robots[0])
-        if not as_wanted or {wanted.recording} != {self._written, self._has_record}:
+        if not as_wanted or self._walk.time > _RENEWED or {wanted.recording} != {self._written, self._has_record}:
             self._continue(wanted.robot)
         self._nudge = np.array(self.file.springs.stiffness) * self._random.normal(0.0, _NUDGE, len(self._nudge))
         self._push()

@@ -13,6 +13,9 @@ from chilopod.frozen import Array
 from chilopod.live.wishes import LARGEST_SEED
 from chilopod.robot import Robot
 
+_ONE_WAY = 0.8  # of the bend on one side, of a curve: its radius is that of all joints, whatever their side
+_ALONG = 1.0 / 3.0  # of the bend, by which the turn of a path may differ from it
+
 
 @dataclass(frozen=True)
 class Seen:
@@ -33,11 +36,23 @@ class Seen:
     steering: str  #: name of the strategy that steers there: leg yaw while those of springs are not known; "" for none
     state: Array  #: as ``initial`` of the engine's ``start`` takes it, (n,)
     undulates: bool  #: True if it bends from side to side, so that its mean is no curve
+    turned: float  #: by which module 1 turned while it walked the last length of the axis, rad; NaN before that
 
     @property
     def bend(self) -> float:
         """Sum of the sizes of the mean angles, rad: the paper's measure."""
         return float(np.abs(self.mean_angles).sum())
+
+    @property
+    def one_way(self) -> bool:
+        """True if nearly all of the bend is to one side."""
+        return abs(float(self.mean_angles.sum())) > _ONE_WAY * self.bend
+
+    @property
+    def curves(self) -> bool:
+        """True if the body lies on a curve, along the path that it has walked."""
+        bent = float(self.mean_angles.sum())
+        return self.one_way and not self.undulates and abs(self.turned + bent) < _ALONG * abs(bent)
 
 
 @dataclass(frozen=True)

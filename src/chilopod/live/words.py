@@ -75,21 +75,23 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
             return f"It walks {arc}. Though {stiff}, the straight walk is unstable: {_grows(growth)}."
         if not theory.verdict(k1) and not (growth and growth.rate < 0.0):
             return f"It walks {arc}: {stiff}."
-        if bent:
+        if seen.bend > _STRAIGHT:
             now = "straightens" if seen.turning < 0.0 else "will straighten"
-            return f"The curve of {radius:.2f} m {now}: {stiff}."
+            return f"The {f'curve of {radius:.2f} m' if seen.curves else 'bend'} {now}: {stiff}."
         fades = f", and what disturbs it fades by {_percent(growth)} a second" if growth and growth.rate < 0.0 else ""
         return f"Straight and stable: {stiff}{fades}."
     soft = f"Past the pitchfork: its first spring, {spring_text(k1)}, is softer than {spring_text(theory.pitchfork)}"
     if settled is None:
         beyond = theory.remark or "no settled curve is known with this spring"
         return f"{soft}, and it walks {arc} ({beyond})."
-    if bent and abs(radius - settled) < _SETTLED * settled and abs(seen.turning) < _SLOW * seen.bend:
-        return f"Settled on {arc}; the branch of curved walks has {settled:.2f} m. {soft}."
     if not bent:
         speed = f" by {_percent(growth)} a second" if growth and growth.rate > 0.0 else ""
         grows = f"the smallest bend grows{speed}, to {settled:.2f} m in the end"
         return f"{soft}: the straight walk is unstable, and {grows}."
+    if not seen.curves:
+        return f"{soft}, and it walks {arc}."
+    if abs(radius - settled) < _SETTLED * settled and abs(seen.turning) < _SLOW * seen.bend:
+        return f"Settled on {arc}; the branch of curved walks has {settled:.2f} m. {soft}."
     return f"{soft}. The curve, {radius:.2f} m to the {side}, {_moving(radius, settled, seen)}."
 
 
@@ -124,13 +126,13 @@ def _side(seen: Seen) -> str:
 
 
 def _arc(seen: Seen, growth: Growth | None = None) -> str:
-    """Way of a walk in words; a bend that goes from side to side, or is bound to, is no curve."""
+    """Way of a walk in words; a bend that goes from side to side, or is bound to, or not along the path is no curve."""
     if seen.bend <= _STRAIGHT:
         return "straight on"
     if seen.undulates:
         return "on, swaying from side to side"
-    if growth and growth.rate > 0.0 and growth.sways:
-        return f"on, bent to the {_side(seen)} just now"
+    if not seen.curves or (growth and growth.rate > 0.0 and growth.sways):
+        return f"on, bent {f'to the {_side(seen)}' if seen.one_way else 'both ways'} just now"
     return f"a curve of {radius_of(seen):.2f} m to the {_side(seen)}"
 
 
