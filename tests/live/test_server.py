@@ -319,6 +319,32 @@ def test_a_browser_that_nobody_knows_yet_moves_no_slider(page):
     page.wish(wishes.Set("friction", before))
 
 
+def test_a_number_that_is_being_typed_is_no_attack(page, caplog):
+    """On the way to 12 the first spring is 1, below its range; and who empties a field sends 0."""
+    port, before, spring = port_of(page), page.gate.refused, page._controls._sliders["springs.stiffness[0]"]
+    seed, taken = page._controls._seed, []
+    at = {"origin": f"http://localhost:{port}", "subprotocols": [PROTOCOL]}
+    with (
+        connect(f"ws://localhost:{port}", **at, compression=None, max_size=None, close_timeout=0.1) as client,
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        client.send(msgspec.msgpack.encode(live_clients._CAMERA))
+        patch.setattr(spring._impl, "update_cb", [lambda event: taken.append(event.target.value)])
+        patch.setattr(page.gate, "refused", 0)
+        for handle, value in ((spring, 1), (spring, 999.0), (seed, 2.5), (seed, -3), (spring, 12), (spring, 1e17)):
+            update = {"type": "GuiUpdateMessage", "uuid": handle._impl.uuid, "updates": {"value": value}}
+            client.send(msgspec.msgpack.encode(update))
+        end = time.monotonic() + 10.0
+        while not (taken and page.gate.refused) and time.monotonic() < end:
+            time.sleep(0.01)
+        assert (taken, page.gate.refused, seed.value) == ([12], 1, 1)
+    (said,) = [each.getMessage() for each in caplog.records if each.name == "chilopod.live"]
+    assert "GuiUpdateMessage" in said
+    assert "the page does not offer it" in said
+    page.gate.refused = before
+    page.wish(wishes.Spring(0, PLANAR.springs.stiffness[0]))
+
+
 def test_a_flood_of_messages_is_slowed_down(page):
     port, before, begun = port_of(page), page.gate.refused, time.monotonic()
     at = {"origin": f"http://localhost:{port}", "subprotocols": [PROTOCOL]}

@@ -80,6 +80,13 @@ def test_the_words_in_the_picture_keep_apart():
     assert STABLE not in picture  # nobody has judged the straight walk
 
 
+@pytest.mark.parametrize(("bend", "labels"), [(0.0, "−45 0 45"), (100.0, "−90 0 90"), (-200.0, "−180 −90 0 90 180")])
+def test_the_axis_of_bends_has_a_scale(bend, labels):
+    """At least one number above and below 0, also where no branch is known."""
+    picture = drawn(Theory(), SPRINGS[1], [(stiffness(2.05), bend)])
+    assert " ".join(re.findall(">(−?[0-9]+)°<", picture)) == labels
+
+
 def test_what_cannot_be_known_is_said():
     pieces = []
     theory_of(PLANAR.with_value("gait.side_phase", 0.0), "planar", SPRINGS, pieces.append)

@@ -146,8 +146,8 @@ def _branches(theory: Theory, bends: Array, place: _Place) -> list[str]:
 
 
 def _axes(place: _Place) -> list[str]:
-    parts = []
-    for bend in (-180, -90, 0, 90, 180):
+    parts, tick = [], 90 if place.most >= 90.0 else 45
+    for bend in range(-2 * tick, 2 * tick + 1, tick):
         if abs(bend) <= place.most:
             y = place(0.0, bend)[1]
             parts += [_grid(_LEFT, y, _RIGHT, y), _text(_LEFT - 4.0, y + 4.0, f"{bend}°".replace("-", "−"), "end")]
