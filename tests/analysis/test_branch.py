@@ -268,3 +268,9 @@ def test_written_and_printed(right, tmp_path):
     assert result["direction_confirms"] is True
     lines = (tmp_path / "branch.csv").read_text().splitlines()
     assert len([line for line in lines if not line.startswith("#")]) == 1 + right.sizes["point"]
+
+
+def test_a_search_for_the_pitchfork_that_takes_too_long_is_given_up():
+    """Not "no pitchfork": none was looked for."""
+    with pytest.raises(AnalysisError, match=r"8 N.*20 N.*: the search for a pitchfork was given up after 0 s; allowed"):
+        curved_walks(ROBOT, K1, (stiffness(8.0), stiffness(20.0)), seconds=0.0)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.errors import AnalysisError
 from chilopod.planar import initial_states, simulate
 from chilopod.show.play import motion, play
 from chilopod.show.play.page import theory
@@ -137,11 +138,27 @@ def test_what_the_page_says(browser):
     assert folded == "A joint is bent by more than a right angle. The walk has ended: restart it."
 
 
-@pytest.mark.parametrize(("query", "spring"), [("?k1=8", 8.0), ("?k1=1e9", 51.25), ("?k1=nonsense&seed=-3", 8.0)])
-def test_the_address_sets_the_spring(page, browser, query, spring):
+@pytest.mark.parametrize(
+    ("query", "spring", "note"),
+    [
+        ("?k1=8", 8.0, ""),
+        ("?k1=51.25&seed=0", 51.25, ""),
+        ("?seed=2.5", 8.0, "seed = 2.5 (allowed: 0 to 2147483648, now 2)"),
+        ("?k1=1e9", 51.25, "k1 = 1e9 (allowed: 2.05 to 51.25, now 51.25)"),
+        (
+            "?k1=nonsense&seed=-3",
+            8.0,
+            "seed = -3 (allowed: 0 to 2147483648, now 0), k1 = nonsense (allowed: 2.05 to 51.25, now 8)",
+        ),
+    ],
+)
+def test_the_address_sets_the_spring(page, browser, query, spring, note):
     browser("Page.navigate", url=page.as_uri() + query)
     browser.run("new Promise((done) => setTimeout(done, 300))")
     assert browser.run("play.robot.springs[0] / play.data.unit") == pytest.approx(spring)
+    assert browser.run("document.getElementById('note').textContent") == (
+        f"Wrong in the address: {note}." if note else ""
+    )
 
 
 def test_the_numbers_of_the_motion_are_those_of_the_robot(robot):
@@ -149,6 +166,32 @@ def test_the_numbers_of_the_motion_are_those_of_the_robot(robot):
     assert found["modules"] == 6
     assert found["springs"] == list(robot.springs.stiffness)
     assert [event["side"] for event in found["legYaw"]["events"]] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("asked", "part"),
+    [
+        ((), "the search for a pitchfork was given up after 0 s; allowed: fewer or heavier modules"),
+        (("--out", "/dev/null/x.html"), "/dev/null/x.html: --out: cannot be written"),
+    ],
+)
+def test_what_cannot_be_a_page_is_refused_in_a_line(asked, part, monkeypatch):
+    monkeypatch.setattr("chilopod.show.play.page._SEARCH", 0.0)
+    code, _, err = run("play", *asked)
+    assert code == 2
+    assert err.count("\n") == 1
+    assert part in err
+
+
+def test_a_robot_without_a_radius_law_is_named(robot, monkeypatch):
+    def law(*_):
+        raise AnalysisError("subcritical: it jumps", field="branch")
+
+    monkeypatch.setattr("chilopod.show.play.page.radius_laws", law)
+    with pytest.raises(
+        AnalysisError, match=r"^robot = 'aoi2022-planar': subcritical: it jumps; allowed: one whose turns"
+    ):
+        play(robot)
 
 
 def test_the_command_writes_one_file_and_replaces_none(tmp_path, monkeypatch):

@@ -19,6 +19,7 @@ from chilopod import stability, units
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family, interval_text
 from chilopod.engine import Status
 from chilopod.errors import AnalysisError, ParameterError, nearest_name
+from chilopod.flows.deadline import SpentError
 from chilopod.frozen import Array
 from chilopod.netcdf import UnsoundError, unsealed
 from chilopod.notebook import finite
@@ -26,7 +27,7 @@ from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.stretch import MOST_BENT
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, Start, follow, switch
+from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, SearchStatus, Start, follow, switch
 from chilopod.stability.branches.branch import LONGEST
 from chilopod.stability.spectrum import VERDICTS
 
@@ -48,6 +49,27 @@ _SAME = "body", "springs", "legs", "gait", "ground"
 _VERDICT = "criticality", "coefficient", "direction", "direction_confirms"
 
 
+def _pitchfork(robot: Robot, parameter: str, between: tuple[float, float], seconds: float) -> WalkBifurcation:
+    """Stiffest pitchfork in an interval; an AnalysisError if there is none, or the search takes too long."""
+    searched, remarks = interval_text(robot, parameter, between), list[str]()
+    try:
+        found = bifurcations(robot, parameter, between, remark=remarks.append, seconds=seconds)
+    except SpentError:  # before the first point
+        found, remarks = [], [SearchStatus.BUDGET.sentence]
+    forks = [each for each in found if each.point.kind is Kind.PITCHFORK]
+    if SearchStatus.BUDGET.sentence in remarks and (seconds < np.inf or not forks):
+        problem = f"the search for a pitchfork was given up{f' after {seconds:g} s' if seconds < np.inf else ''}"
+        raise AnalysisError(problem, field=f"between {parameter}", value=searched, allowed="fewer or heavier modules")
+    if not forks:
+        uneven = not robot.gait.half_period_symmetric and any(each.point.kind is Kind.TRANSCRITICAL for each in found)
+        problem = NO_PAIR if uneven else "the straight walk has no pitchfork in this interval"
+        others = [f"{each.point.kind.label} at {units.format(each.point.value, each.unit, digits=6)}" for each in found]
+        here = f"here are: {', '.join(others)}" if others else "`chilopod bifurcation` lists where the walk bends"
+        allowed = f"an interval around a pitchfork; {here}"
+        raise AnalysisError(problem, field=f"between {parameter}", value=searched, allowed=allowed)
+    return forks[-1]
+
+
 def curved_walks(
     robot: Robot,
     parameter: str,
@@ -57,6 +79,7 @@ def curved_walks(
     longest: float = LONGEST,
     side: int = 1,
     progress: Progress = silent,
+    seconds: float = np.inf,
 ) -> xr.Dataset:
     """Follow the curved walks from the stiffest pitchfork of the straight walk through an interval of a parameter.
 
@@ -71,6 +94,8 @@ def curved_walks(
         the curve, over orbit (SI units) and parameter (over the width of the interval).
     side
         +1: positive joint angles, a right turn; -1: the mirror image.
+    seconds
+        Time for the search for the pitchfork, s, after which an AnalysisError ends it.
 
     Returns
     -------
@@ -87,17 +112,7 @@ def curved_walks(
     ``coefficient`` (1/rad^2), the ``direction`` in which the branch leaves it, and ``direction_confirms``, True if that
     agrees with the verdict. AnalysisError if there is no pitchfork in the interval.
     """
-    found = bifurcations(robot, parameter, between)
-    forks = [each for each in found if each.point.kind is Kind.PITCHFORK]
-    if not forks:
-        uneven = not robot.gait.half_period_symmetric and any(each.point.kind is Kind.TRANSCRITICAL for each in found)
-        problem = NO_PAIR if uneven else "the straight walk has no pitchfork in this interval"
-        searched = interval_text(robot, parameter, between)
-        others = [f"{each.point.kind.label} at {units.format(each.point.value, each.unit, digits=6)}" for each in found]
-        here = f"here are: {', '.join(others)}" if others else "`chilopod bifurcation` lists where the walk bends"
-        allowed = f"an interval around a pitchfork; {here}"
-        raise AnalysisError(problem, field=f"between {parameter}", value=searched, allowed=allowed)
-    fork = forks[-1]
+    fork = _pitchfork(robot, parameter, between, seconds)
     # The positive side of the mode is that of positive joint angles.
     angles = fork.point.mode.real[3 : robot.body.modules + 2]
     starts = switch(_followed(robot, parameter), fork.point)

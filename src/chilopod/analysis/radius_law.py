@@ -43,12 +43,12 @@ class RadiusLaws(Short):
         return tuple(float(np.interp(wanted, root, walks.orbit.values[:, joint])) for joint in joints)
 
 
-def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
+def radius_laws(robot: Robot, progress: Progress = silent, seconds: float = np.inf) -> RadiusLaws:
     """Compute the laws from the branch of curved walks, from the pitchfork down to a bend of a right angle in a joint.
-    AnalysisError if the straight walk has no pitchfork in the first spring, or walks beside it give no law."""
+    AnalysisError if there is no pitchfork in the first spring, the search takes too long, or no law is beside it."""
     stiffest = max(robot.springs.stiffness)
     low, high = (part * stiffest for part in _BETWEEN)
-    walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress)
+    walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress, seconds=seconds)
     springs, stable, radii = walks.parameter_si.values, walks.stable.values, (walks.axis_radius, walks.path_radius)
     axis, path = (RadiusLaw.of_branch(springs, each.values, stable, robot.unit_of(K1)) for each in radii)
     return RadiusLaws(axis, path, walks)

@@ -4,9 +4,9 @@
   const by = (id) => document.getElementById(id);
   const TOLERANCE = 1e-8, NUDGE = 0.001, DEGREE = Math.PI / 180, LONGEST_FRAME = 0.1, FOLLOWING = 0.4, FINEST = 2;
   const [softest, stiffest] = data.range.map((each) => each / data.unit);
-  const asked = new URLSearchParams(location.search);
+  const asked = new URLSearchParams(location.search), wrong = [];
   const robot = planarRobot(data, TOLERANCE);
-  let random = mulberry(number(asked.get("seed"), 1, 0, 2 ** 31));
+  let random = mulberry(number("seed", 1, 0, 2 ** 31, Math.trunc));
   let paused = matchMedia("(prefers-reduced-motion: reduce)").matches, last = null, cycles = 0;
   let path = [], trail = [], reached = null, chosen = data.springs[0] / data.unit;
   const camera = { x: 0, y: 0 };
@@ -341,9 +341,14 @@
     requestAnimationFrame(frame);
   }
 
-  function number(text, otherwise, low, high) {
-    const value = text === null || text.trim() === "" ? NaN : Number(text);
-    return Number.isFinite(value) ? Math.min(Math.max(value, low), high) : otherwise;
+  // Number of the address, within its range.
+  function number(name, otherwise, low, high, whole = (each) => each) {
+    const text = asked.get(name), value = text === null || text.trim() === "" ? NaN : Number(text);
+    const used = Number.isFinite(value) ? whole(Math.min(Math.max(value, low), high)) : otherwise;
+    const [least, most, now] = [low, high, used].map((each) => Number(each.toPrecision(10)));
+    if (text !== null && !(Math.abs(used - value) <= 1e-9 * Math.abs(value)))
+      wrong.push(`${name} = ${text.slice(0, 40)} (allowed: ${least} to ${most}, now ${now})`);
+    return used;
   }
 
   function mulberry(seed) {
@@ -363,6 +368,7 @@
   window.play = { robot, data, walk, words, frames: 0 };
   robot.steersSpring = by("steers").checked;
   restart();
-  setSpring(number(asked.get("k1"), data.springs[0] / data.unit, softest, stiffest));
+  setSpring(number("k1", data.springs[0] / data.unit, softest, stiffest));
+  if (wrong.length) by("note").textContent = `Wrong in the address: ${wrong.join(", ")}.`;
   requestAnimationFrame(frame);
 })();

@@ -9,6 +9,7 @@ from scipy.integrate import DOP853
 
 from chilopod.analysis.parameters import stiffness
 from chilopod.analysis.radius_law import radius_laws
+from chilopod.errors import AnalysisError
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -21,6 +22,7 @@ from chilopod.tasks.radius_law import that_holds
 
 _SOFTEST, _STIFFEST = 0.05, 1.25  # of the stiffest spring of the file: range of the slider
 _STAGES = 12
+_SEARCH = 60.0  # s for the pitchfork, as at the command line
 
 
 def play(robot: Robot, progress: Progress = silent) -> str:
@@ -78,7 +80,12 @@ def motion(robot: Robot) -> dict[str, Any]:
 def theory(robot: Robot, progress: Progress = silent) -> tuple[xr.Dataset, RadiusLaw]:
     """Left turns of a robot, and the radius law of its axis as far as it gets there from straight; errors as of
     :func:`play`."""
-    laws = radius_laws(robot, progress)
+    try:
+        laws = radius_laws(robot, progress, _SEARCH)
+    except AnalysisError as error:
+        if error.field == "branch":
+            error.field, error.value, error.allowed = "robot", robot.name, "one whose turns tighten as k1 falls"
+        raise
     return laws.walks, that_holds(laws.axis, robot)
 
 
