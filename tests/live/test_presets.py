@@ -58,6 +58,22 @@ def test_nonsense_in_an_address_is_one_line_and_changes_nothing(asked, part):
     assert wrong
 
 
+def test_names_that_contain_the_separator_are_quoted():
+    wrong = read("robot=nope", SLIDERS)[1]
+    assert wrong.endswith(
+        "allowed: 'as started', 'paper, planar', 'paper, whole robot', 'ten modules', "
+        "'slippery floor', 'uniform soft springs'"
+    )
+
+
+def test_many_mistakes_in_an_address_are_one_short_line():
+    found, wrong = read(urlencode({f"unknown{number}": 1 for number in range(60)}), SLIDERS)
+    assert found == []
+    assert wrong.count("friction") == 1
+    assert [f"unknown{number} = " in wrong for number in range(60)] == [True] * 5 + [False] * 55
+    assert wrong.endswith("; and 55 more")
+
+
 def test_an_address_of_too_many_parts_is_none():
     assert read("&".join(["k1=8"] * 1000), SLIDERS) == ([], "")
 

@@ -231,9 +231,10 @@ def test_walks_on_for_a_time_only(seconds):
 
 def test_a_walk_of_more_than_a_day_goes_on(monkeypatch):
     """The engines walk no more than 1e5 s at a time."""
-    monkeypatch.setattr("chilopod.live.session._RENEWED", 1.0)
+    monkeypatch.setattr("chilopod.live.session.LONGEST", 2.0)
     walking = session()
-    walking.walk_on(3.0)
+    walking.walk_on(1.5)
+    walking.walk_on(1.5)
     assert walking.seen().time == pytest.approx(3.0)
     assert walking.seen().clock < 1.9
 

@@ -15,7 +15,7 @@ import typer
 from chilopod.cli import options as shared
 from chilopod.cli.options import EngineOption, ForceOption, JsonOption, RobotArg, SetOption, choices, with_options
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import OutputError, ParameterError
+from chilopod.errors import OutputError, ParameterError, concerning
 from chilopod.live.ports import check_port
 from chilopod.live.wishes import LARGEST_SEED
 
@@ -81,16 +81,21 @@ def live(options: LiveOptions) -> None:
     check_port(options.port)
     if out is not None:
         earlier = out.glob("chilopod-live-*") if out.is_dir() else ()
-        shared.free([*_files(out, "chilopod-live-1"), *earlier], options.force)
+        with concerning("--out"):
+            shared.free([*_files(out, "chilopod-live-1"), *earlier], options.force)
     described = shared.read_robot(options.robot, options.overrides)
     from chilopod.live import Live
 
+    class Page(Live):
+        def listens(self) -> None:
+            typer.echo(f"{described.name} walks at {self.address} (Ctrl-C ends it)")
+            if options.browser and not webbrowser.open(self.address):
+                typer.echo(f"no browser could be started: open {self.address} in one", err=True)
+
     named = {name: getattr(options, name) for name in ("engine", "seed", "strategy", "host", "port", "token")}
-    page = Live(described, **named, kept=None if out is None else partial(_keep, out, options.force))
+    with progress_bar("live"):
+        page = Page(described, **named, kept=None if out is None else partial(_keep, out, options.force))
     try:
-        typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
-        if options.browser and not webbrowser.open(page.address):
-            typer.echo(f"no browser could be started: open {page.address} in one", err=True)
         page.wait(seconds)
     finally:
         _end(page, options.force)
@@ -132,7 +137,7 @@ def play(
 ) -> None:
     """Write a page in which the planar robot walks in any browser: drag its first spring, click the floor.
 
-    The page is one file of about 44 kB. It computes the planar model itself, loads nothing, and opens from disk.
+    The page is one file of about 45 kB. It computes the planar model itself, loads nothing, and opens from disk.
 
     The address sets the first spring and the seed: play.html?k1=8&seed=2.
 
@@ -141,7 +146,8 @@ def play(
     from chilopod.show.play import play as page
 
     described = shared.read_robot(robot, overrides)
-    shared.free([out], force, ".html")
+    with concerning("--out"):
+        shared.free([out], force, ".html")
     with progress_bar("play") as show:
         html = page(described, lambda done, words: show("branch of curved walks", done, words))
     shared.save(out, html, described, force=force, as_json=as_json)

@@ -40,8 +40,6 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from chilopod.errors import in_words
-
 _LARGEST = 16_384  # bytes of a message; those of viser's client have a few hundred
 _RATE = 200.0  # messages a second from one browser; one that drags sends 60
 _AT_ONCE = 1.0  # s of messages that may come at once
@@ -209,7 +207,7 @@ class Gate:
 
     def message(self, connection: _Guarded, raw: Any) -> bytes | None:
         """Checked part of a message, written down anew for viser to read; None if it is refused."""
-        read, why = None, "the page does not offer it"
+        read: Any = None
         try:
             read = msgspec.msgpack.decode(raw)
             kind = _KINDS[read["type"]]
@@ -217,15 +215,14 @@ class Gate:
             # Types are those that viser gives; any float is one of them.
             known = fields.issuperset(read) and _bounded(read)
             offered = known and self._offers(connection, msgspec.convert(read, kind))
-        except (ValueError, TypeError, LookupError, RecursionError) as error:
-            offered, why = False, ascii(in_words(error))[1:_LONGEST]
+        except (ValueError, TypeError, LookupError, RecursionError):
+            offered = False
         if offered is False:
-            self._refuse(f"a message, {reprlib.repr(read)!a}: {why}")
+            self._refuse(f"a message that it does not offer, {reprlib.repr(read)!a}")
         return msgspec.msgpack.encode(read) if offered else None
 
     def _offers(self, connection: _Guarded, message: Any) -> bool | None:
-        """True if the page has the element that a message names; None if its number is out of range, as while it is
-        typed."""
+        """True if the page has the element that a message names; None for a number out of range, as on the way."""
         server = self._viser
         assert server is not None
         there = list(server._websock_server._live_connections.items())
@@ -241,10 +238,9 @@ class Gate:
                 node: Any = server.scene.get_handle_by_name(name)
                 return bool(node and node._impl.drag_cb) and part in range(len(node.batched_positions))
             case _messages.GuiUpdateMessage(uuid=uuid, updates=updates):
-                handle: Any = next(filter(None, (each._gui_input_handle_from_uuid.get(uuid) for each in scopes)), None)
-                if handle is None or [*updates] != ["value"]:
-                    return False
-                return _takes(handle, updates["value"])
+                handles = [scope._gui_input_handle_from_uuid.get(uuid) for scope in scopes]
+                takes = (_takes(each, updates["value"]) for each in handles if each)
+                return [*updates] == ["value"] and next(takes, False)
             case _messages.CommandTriggerMessage(uuid=uuid):
                 keys = [scope._command_handle_from_uuid.get(uuid) for scope in scopes]
                 return any(key and not key.disabled for key in keys)
@@ -317,10 +313,8 @@ def _takes(handle: Any, value: Any) -> bool | None:
         return value in handle.options
     if not isinstance(handle, viser.GuiSliderHandle | viser.GuiNumberHandle) or None in (handle.min, handle.max):
         return False
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    fits = isinstance(value, int) or not isinstance(handle.value, int)
-    return (fits and handle.min <= value <= handle.max) or None
+    is_number = isinstance(value, int if isinstance(handle.value, int) else int | float) and not isinstance(value, bool)
+    return (handle.min <= value <= handle.max or None) if is_number else False
 
 
 def _is_local(host: str) -> bool:

@@ -17,7 +17,7 @@ from chilopod.robot import Robot, load_robot
 from chilopod.steering import ON_THE_WAY, strategy_named
 
 _OTHERS: Final = ("token", "darkMode")  # parts of an address that are no settings
-_MOST, _LONGEST = 60, 40  # parts of an address, and characters of a value that are repeated
+_MOST, _LONGEST, _SAID = 60, 40, 5  # parts of an address, characters of a name or value, mistakes named
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,7 @@ def read(asked: str, sliders: Mapping[str, Slider]) -> tuple[list[wishes.Wish], 
     """Wishes of an address, and a line on what in it is no setting or out of range, else an empty one."""
     found, wrong, keys = dict[str, wishes.Wish](), list[str](), {row.key: row for row in sliders.values()}
     allowed = (*keys, "seed", "strategy", "robot")
+    known: str | None = ", ".join(allowed)
     for key, text in _pairs(asked):
         try:
             if key in keys:
@@ -75,23 +76,23 @@ def read(asked: str, sliders: Mapping[str, Slider]) -> tuple[list[wishes.Wish], 
             elif key == "seed":
                 found[key] = wishes.Reset(as_seed(_number(key, text)))
             elif key == "strategy":
-                found[key] = wishes.Steering(strategy_named(text[:_LONGEST], ON_THE_WAY).name)
+                found[key] = wishes.Steering(strategy_named(text, ON_THE_WAY).name)
             elif key == "robot" and text not in PRESETS:
-                raise ParameterError("must be a preset", field=key, value=text[:_LONGEST], allowed=", ".join(PRESETS))
+                raise ParameterError("must be a preset", field=key, value=text, allowed=", ".join(map(repr, PRESETS)))
             elif key != "robot" and key not in _OTHERS:
-                key, known = key[:_LONGEST], ", ".join(allowed)
-                near = nearest_name(key, allowed)
-                raise ParameterError("must be a setting", field=key, value=text[:_LONGEST], allowed=known, nearest=near)
+                near, told, known = nearest_name(key, allowed), known, None  # the list is said once
+                raise ParameterError("must be a setting", field=key, value=text, allowed=told, nearest=near)
         except ParameterError as error:
             wrong.append(str(error))
     # The walk begins anew with everything else as it is asked for.
     asked_for = sorted(found.values(), key=lambda wish: isinstance(wish, wishes.Reset))
-    return asked_for, f"In the address: {'; '.join(wrong)}" if wrong else ""
+    more = [f"and {len(wrong) - _SAID} more"] if len(wrong) > _SAID else []
+    return asked_for, f"In the address: {'; '.join([*wrong[:_SAID], *more])}" if wrong else ""
 
 
 def _pairs(asked: str) -> list[tuple[str, str]]:
     try:
-        return parse_qsl(asked, keep_blank_values=True, max_num_fields=_MOST)
+        return [(key[:_LONGEST], text[:_LONGEST]) for key, text in parse_qsl(asked, True, max_num_fields=_MOST)]
     except ValueError:
         return []
 
@@ -106,4 +107,4 @@ def _number(key: str, text: str) -> float:
         number = float(text)
         return int(number) if number == int(number) else number
     except (ValueError, OverflowError):
-        raise ParameterError("must be a number", field=key, value=text[:_LONGEST]) from None
+        raise ParameterError("must be a number", field=key, value=text) from None

@@ -99,6 +99,8 @@ class Live:
             self.server.gui.configure_theme(show_share_button=False, show_logo=False)
             self.server.gui.set_panel_label("chilopod live")
             self.gate.pictures = self._picture
+            self.address = self.gate.link(self.server.get_port())
+            self.listens()
             self._compile(robot, engine)
             self._furnish()
             self.server.scene.on_click()(self._clicked)
@@ -106,8 +108,10 @@ class Live:
         except BaseException:
             self.close()
             raise
-        self.address = self.gate.link(self.server.get_port())
         self._thread.start()
+
+    def listens(self) -> None:
+        """Called when the page answers at its address, before the first walk is compiled; does nothing here."""
 
     def _compile(self, robot: Robot, engine: str) -> None:
         """Walk the first steps ever, which are compiled, before anybody wants to see them; and say so."""

@@ -45,8 +45,6 @@ _MOST_RECORDS = 100  # of a session
 _MOST_BYTES = 1 << 29  # of all of them, before they are packed
 _MOST_WORDS = 4
 _REMEMBERED = 600  # looks, in which an undulation is sought
-_RENEWED = 0.5 * LONGEST  # s after which a walk goes on as another, as the engines want it
-_BEHIND = 6000  # looks, in which the slowest robot walks its own length
 
 
 class Session:
@@ -170,7 +168,7 @@ class Session:
         self._looks: deque[Array] = deque([self._walk.observe().joint_angles[0]] * LOOKS, maxlen=LOOKS)
         self._bends: deque[float] = deque(maxlen=LOOKS + 1)
         self._left: deque[bool] = deque(maxlen=_REMEMBERED)
-        self._headings: deque[float] = deque(maxlen=_BEHIND)  # of module 1, not wrapped
+        self._headings: deque[float] = deque(maxlen=10 * _REMEMBERED)  # of module 1, not wrapped
 
     def _undulates(self) -> bool:
         """True if the bend goes from side to side: it has not stayed on this one for longer than the last whole
@@ -228,7 +226,7 @@ class Session:
             self.stop_recording()
         wanted = self.settings
         as_wanted = but_springs(wanted.robot) == but_springs(self._walk.robots[0])
-        if not as_wanted or self._walk.time > _RENEWED or {wanted.recording} != {self._written, self._has_record}:
+        if not as_wanted or self._walk.time > 0.5 * LONGEST or {wanted.recording} != {self._written, self._has_record}:
             self._continue(wanted.robot)
         self._nudge = np.array(self.file.springs.stiffness) * self._random.normal(0.0, _NUDGE, len(self._nudge))
         self._push()

@@ -13,8 +13,7 @@ from chilopod.frozen import Array
 from chilopod.live.wishes import LARGEST_SEED
 from chilopod.robot import Robot
 
-_ONE_WAY = 0.8  # of the bend on one side, of a curve: its radius is that of all joints, whatever their side
-_ALONG = 1.0 / 3.0  # of the bend, by which the turn of a path may differ from it
+_ONE_WAY, _ALONG = 0.8, 1.0 / 3.0  # of the bend of a curve: on one side, and different from the turn of its path
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,7 @@ class Seen:
     @property
     def curves(self) -> bool:
         """True if the body lies on a curve, along the path that it has walked."""
-        bent = float(self.mean_angles.sum())
-        return self.one_way and not self.undulates and abs(self.turned + bent) < _ALONG * abs(bent)
+        return self.one_way and not self.undulates and bool(abs(self.turned / self.mean_angles.sum() + 1.0) < _ALONG)
 
 
 @dataclass(frozen=True)

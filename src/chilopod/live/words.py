@@ -35,8 +35,7 @@ def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | N
     if settings.paused:
         said.append("Paused: the space bar goes on.")
     if seen.target is not None:
-        x, y = seen.target
-        away = math.hypot(x - seen.pose[0], y - seen.pose[1])
+        away = math.dist(seen.target, seen.pose[:2])
         if seen.steering:
             said.append(f"On its way to the target, {away:.2f} m off, with the strategy {seen.steering}.")
             said += _held(seen, settings)
@@ -65,7 +64,6 @@ def _held(seen: Seen, settings: Settings) -> list[str]:
 def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     k1 = float(seen.stiffness[0])
     radius, side, arc = radius_of(seen), _side(seen), _arc(seen, growth)
-    bent = seen.bend > _STRAIGHT and not seen.undulates
     if theory.pitchfork is None:
         return _without_pitchfork(seen, theory, growth)
     fork, settled = f"the pitchfork at {spring_text(theory.pitchfork)}", theory.settled(k1)
@@ -84,7 +82,7 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     if settled is None:
         beyond = theory.remark or "no settled curve is known with this spring"
         return f"{soft}, and it walks {arc} ({beyond})."
-    if not bent:
+    if seen.bend <= _STRAIGHT or seen.undulates:
         speed = f" by {_percent(growth)} a second" if growth and growth.rate > 0.0 else ""
         grows = f"the smallest bend grows{speed}, to {settled:.2f} m in the end"
         return f"{soft}: the straight walk is unstable, and {grows}."
