@@ -166,7 +166,7 @@ def test_a_joint_that_is_dragged_bends_and_springs_back(opened, live):
     opened.mouse.down()
     opened.mouse.move(x + 20.0, y + 20.0, steps=4)
     live.wish(wishes.Pause(False))
-    read(opened, r"Joint \d is pulled aside, and it walks a curve of")
+    read(opened, r"Joint \d is pulled aside, and it walks on, bent")
     assert np.abs(live.seen.joint_angles).max() > 0.1
     opened.mouse.up()
     live.wish(wishes.Set("speed", 10.0))
@@ -228,6 +228,19 @@ def test_nonsense_in_a_field_is_refused_in_a_line(opened):
     type_into(opened, "seed", "-4")
     time.sleep(1.0)
     read(opened, READY)
+
+
+def test_typing_a_number_is_not_refused(opened, live):
+    """On the way to 30 the first spring is 3, and on the way to 12 it is 1, below its range."""
+    read(opened, READY)
+    before = live.gate.refused
+    field = type_into(opened, "first spring", "41")
+    for text in ("12", "30"):
+        field.press("Control+a")
+        field.press_sequentially(text, delay=50)
+        field.press("Enter")
+        read(opened, f"its first spring, {text} N")
+    assert live.gate.refused == before
 
 
 def test_who_does_not_read_holds_up_nobody(opened, live):
