@@ -10,7 +10,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.analysis import cycle_multipliers, walk_multipliers
 from chilopod.analysis.cycle_modes import CycleMode, CycleMultipliers
-from chilopod.analysis.cycle_multipliers import AMPLITUDE, spectral_moves
+from chilopod.analysis.cycle_multipliers import AMPLITUDE, _closed, spectral_moves
 from chilopod.analysis.parameters import K1
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.twin import CycleMap, start, walk_cycle
@@ -62,6 +62,30 @@ def test_the_motion_is_the_one_that_the_start_settles_into(damping, begun):
     assert abs(found.state[0]) < 1e-2
     # Overdamped, c q' = -m g l q over the period.
     assert found.exact[0].multiplier.real == pytest.approx(np.exp(-9.81 * 0.5 * 0.2 / damping), abs=5e-4)
+
+
+@pytest.mark.parametrize("cycles", [70, 100, 130])
+def test_a_motion_that_stalls_and_then_settles_is_found(cycles):
+    """A slide with dry friction is slowed down evenly and comes to rest after some cycles; a spring swings besides."""
+    text = CART.replace('damping="0.3"', 'frictionloss="0.01"')
+    cycle = CycleMap(mujoco.MjModel.from_xml_string(text), np.zeros((100, 2)), travel=("x",))
+    found = cycle_multipliers("cart", cycle, np.array([0.1, 0.01 * cycles, 0.0]), ["y"])
+    step = np.array([[1.0 - 2e-4 / 1.001, 0.01 / 1.001], [-0.02 / 1.001, 1.0 / 1.001]])
+    pair = np.linalg.eigvals(step)[0] ** 100
+    assert found.stable is True
+    assert found.exact[0].multiplier == pytest.approx(complex(pair.real, abs(pair.imag)), abs=1e-7)
+
+
+def test_the_fixed_point_is_found_beside_many_slow_modes():
+    """The image of a state, x - A x - x^3 with eigenvalues of A from 0.001 to 1, is the state at 0 alone."""
+    rates = np.geomspace(1e-3, 1.0, 40)
+
+    def cycle(states):
+        return states - rates * (states + 3.0 * states**3), None
+
+    found, closes = _closed(cycle, np.full(40, 0.3))
+    assert closes
+    assert np.abs(found).max() < 1e-8
 
 
 def test_a_mode_that_dies_out_at_once_does_not_hide_the_others():
@@ -320,6 +344,7 @@ def test_bends_that_decay_are_no_stable_motion():
     assert found.stable is None
     assert found.title == "lim: bends of 1° decay; no periodic motion was found from this start"
     assert any(words.startswith("limit of h at 0.9") for words in found.contacts)
+    assert "no derivative" not in "\n".join(found.lines())  # which nobody has seen
 
 
 SPRING = """<body pos="0 {0} 0"><joint name="p{0}" type="slide" axis="0 0 1" stiffness="4" damping=".3"/>

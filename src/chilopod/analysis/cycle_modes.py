@@ -146,7 +146,7 @@ class CycleMultipliers(Summary, ReadOnlyArrays):
             said = f"{closes} and lies on a switch, where there is no derivative. Contacts and limits that switch"
         elif self.reach is None:
             scatter = f"bends scatter over {self._shown(float(self.spread.max()), 2)}"
-            said = f"{closes}, {scatter}, and there is no derivative. Contacts change from cycle to cycle"
+            said = f"{closes}, and {scatter}. Contacts that change from cycle to cycle"
         else:
             bends = any(mode.angles.any() for mode in self.exact)  # or else reach is that of their largest coordinate
             what, size = ("bend", self._shown(self.reach, 1)) if bends else ("move", f"{self.reach:.1g}")

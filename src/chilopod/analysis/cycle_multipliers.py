@@ -41,7 +41,8 @@ AMPLITUDE = math.radians(1.0)
 """Default size of a bend, rad: the standard deviation of the trials' disturbance."""
 
 _LEADING = 3  # multipliers
-_SETTLING, _CLOSING, _MEMORY = 30, 30, 10  # cycles: to settle, and of Anderson's method
+_SETTLING, _STALLED = 30, 120  # cycles: to settle, and more where feet have decided anew until then
+_CLOSING, _TRIED, _MEMORY = 150, 30, 30  # cycles of Anderson's method: most, those if it comes no nearer, that it keeps
 _NEARER, _APART = 300, 0.75  # cycles in which a walk comes nearer to a fixed point that it settles into; part left
 _CLOSED = 1e-11  # m, rad, per second
 _STEPS = (1e-7, 1e-8)  # of the differences; the first that changes no contact
@@ -191,15 +192,20 @@ def _check_settled(cycle: CycleMap, seen: Array) -> None:
 def _closed(cycle: CycleMap, x: Array) -> tuple[Array, bool]:
     """State (n,) of a settled walk, and whether it repeats: the fixed point nearby by Anderson's method, if found. One
     that is farther than the walk has moved counts if the walk comes nearer to it: that method jumps. From where
-    the walk is then, or from where a walk that still settles is, it begins once more."""
-    for cycles in (_SETTLING, _NEARER):
+    the walk is then, or from where a walk that has stalled or still settles is, it begins once more. The state is that
+    of the first try if none is found."""
+    first: list[Array] = []
+    for cycles in (_SETTLING, _STALLED, _NEARER):
         begun, moves = x, [np.inf]
         for _ in range(cycles):
             before, x = x, cycle(x[None])[0][0]
             moves.append(float(np.abs(x - before).max()))
         settled, fixed = x, _fixed(cycle, x)
+        first = first or [settled]
         if fixed is None and not (np.diff(moves[-_SETTLING // 2 :]) < 0.0).all():
-            return settled, False
+            if cycles == _SETTLING:
+                continue
+            break
         apart = np.inf if fixed is None else float(np.abs(fixed - settled).max())
         if fixed is not None and apart <= np.abs(settled - begun).max():
             return fixed, True
@@ -207,18 +213,20 @@ def _closed(cycle: CycleMap, x: Array) -> tuple[Array, bool]:
             x = cycle(x[None])[0][0]
             if fixed is not None and np.abs(fixed - x).max() < _APART * apart:
                 return fixed, True
-    return settled, False
+    return first[0], False
 
 
 def _fixed(cycle: CycleMap, x: Array) -> Array | None:
     """Fixed point by Anderson's method, if found."""
     before: list[tuple[Array, Array]] = []
     with suppress(AnalysisError):  # it falls
-        for _ in range(_CLOSING):
+        for tried in range(_CLOSING):
             off = cycle(x[None])[0][0] - x
             if np.abs(off).max() < _CLOSED:
                 return x
             before = [*before[-_MEMORY:], (x, off)]
+            if tried == _TRIED and np.abs(off).max() >= np.abs(before[0][1]).max():
+                break
             moves, changes = np.diff(before, axis=0).transpose(1, 2, 0)
             x = x + off - (moves + changes) @ np.linalg.lstsq(changes, off, rcond=None)[0]
     return None
