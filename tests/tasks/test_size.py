@@ -63,6 +63,33 @@ def test_its_robot_says_what_was_computed_and_what_was_copied(paper):
     assert "±" in paper.lines()[2]
 
 
+@pytest.mark.parametrize(
+    ("changed", "met", "said"),
+    [
+        ({"axis_radius": 0.3}, False, "; the twin's radius is 0.3 m"),
+        ({"direction": "straight"}, False, "; the twin's walk goes straight"),
+        ({"axis_radius": 0.87}, True, ""),
+    ],
+)
+def test_what_the_twin_misses_is_in_title_and_json(paper, changed, met, said):
+    found = replace(paper, walks={**paper.walks, "twin": paper.walks["planar"].assign(**changed)})
+    assert found.title == f"aoi2022-planar: every wish is met in the planar model{said}"
+    printed = found.as_json()
+    assert (printed["outcome"], printed["model"]) == ("met", "planar")
+    assert printed["wishes"][0]["met_by_walk"] == {"planar": True, "twin": met}
+    onset = replace(found, wishes=(Wish("onset", 0.1, -1),))  # which no walk shows
+    assert onset.title == "aoi2022-planar: every wish is met in the planar model"
+    assert onset.as_json()["wishes"][0]["met_by_walk"] == {"planar": None, "twin": None}
+
+
+def test_the_figure_has_range_value_and_wishes(paper):
+    axes = paper.plot(Figure().add_subplot())
+    (label,) = (each.get_text().split("\n") for each in axes.get_yticklabels())
+    assert label[:2] == [K1, "5 N*mm/deg to 60 N*mm/deg"]
+    assert float(label[2].split(" ")[0]) == pytest.approx(paper.numbers[0] / stiffness(1.0), rel=1e-9)
+    assert "radius 0.88 m: found 0.88 m, planar walk 0.88" in axes.get_title()
+
+
 def test_random_wishes_are_met_when_walked():
     radius, speed = np.random.default_rng(1).uniform((0.5, 0.05), (1.3, 0.15))
     found = size(ROBOT, {"radius": radius, "speed": speed}, [SPRING, ("speed", "0.03 m/s", "0.3 m/s")])

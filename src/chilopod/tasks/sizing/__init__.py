@@ -31,7 +31,10 @@ from chilopod.trials import run
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_AS_COMPUTED = 0.02  # largest relative deviation of radius and speed of a planar walk from those computed
+_AS_COMPUTED = (
+    0.02  # largest deviation of radius and speed of a planar walk from those computed, of a twin's from a wish
+)
+_OF_WALK = {"radius": "axis_radius", "speed": "speed"}  # names of wished quantities in the end of a walk
 _SETTLED = 15.0  # settling times of a walk
 _MOST = 1500.0  # gait cycles of a walk, 15 minutes of the paper's robot
 _OF_ONSET = {"onset", "margin", "friction", "work", "coefficient"}
@@ -75,8 +78,14 @@ class Sizing(Summary, ReadOnlyArrays):
 
     @property
     def title(self) -> str:
-        """Robot and outcome."""
-        return f"{self.source}: {self.outcome.sentence}"
+        """Robot and outcome; after a walk of the twin also the model that meets the wishes, and what the twin misses."""
+        said = f"{self.source}: {self.outcome.sentence}"
+        if self.outcome is not Outcome.MET or "twin" not in self.walks:
+            return said
+        walked = {wish: self._walked(wish, "twin") for wish in self.wishes if self._meets(wish, "twin") is False}
+        otherwise = f"walk {_direction(self.walks['twin'])}"
+        missed = [otherwise if v is None else f"{w.quantity} is {self._shown(w, v)}" for w, v in walked.items()]
+        return "; the twin's ".join([f"{said} in the planar model", *missed])
 
     def as_json(self) -> dict[str, Any]:
         """Plain numbers, SI; null for missing values."""
@@ -85,11 +94,14 @@ class Sizing(Summary, ReadOnlyArrays):
         return {
             "robot": self.source,
             "outcome": self.outcome.label,
+            "model": "planar",
             "numbers_si": dict(zip(paths, self.numbers.tolist(), strict=True)),
             "error_bound_si": finite(self.bound),
             "ranges_si": {each.path: [each.low, each.high] for each in self.free},
             "wishes": [
-                {**asdict(wish), "found": finite(value), "walked": {k: self._walked(wish, k) for k in self.walks}}
+                {**asdict(wish), "found": finite(value)}
+                | {"walked": {k: self._walked(wish, k) for k in self.walks}}
+                | {"met_by_walk": {k: self._meets(wish, k) for k in self.walks}}
                 for wish, value in zip(self.wishes, self.values.tolist(), strict=True)
             ],
             "walks": {
@@ -106,9 +118,14 @@ class Sizing(Summary, ReadOnlyArrays):
         }
 
     def _walked(self, wish: Wish, engine: str) -> float | None:
-        name = {"radius": "axis_radius", "speed": "speed"}.get(wish.quantity)
-        end = self.walks[engine]
+        name, end = _OF_WALK.get(wish.quantity), self.walks[engine]
         return finite(float(end[name])) if name and (name == "speed" or is_curved(end)) else None
+
+    def _meets(self, wish: Wish, engine: str) -> bool | None:
+        """Whether a walk meets a wish, within the tolerance of a planar one; None for what no walk shows."""
+        walked = self._walked(wish, engine)
+        meets = walked is not None and abs(wish.deviation(walked)) <= _AS_COMPUTED
+        return meets if wish.quantity in _OF_WALK else None
 
     def _shown(self, wish: Wish, value: float | None) -> str:
         unit = unit_of(wish.quantity, self.robot, self.onset)
@@ -136,7 +153,7 @@ class Sizing(Summary, ReadOnlyArrays):
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the free numbers within their ranges; where wishes conflict, their Pareto front."""
-        axes = axes_for(axes)
+        axes, title = axes_for(axes), self.source
         if len(self.front):
             values = self.front[:, len(self.free) :]
             pair = np.argsort(-np.ptp(values, axis=0))[:2]  # the two that conflict
@@ -151,9 +168,13 @@ class Sizing(Summary, ReadOnlyArrays):
             axes.legend()
         else:
             low, high = (np.array([getattr(each, name) for each in self.free]) for name in ("low", "high"))
-            axes.barh([each.path for each in self.free], (self.numbers - low) / (high - low))
+            heads, *rows = self._content()[1]
+            names = ["\n".join(row[:3]) for row in rows[: len(low)]]
+            axes.barh(names, (self.numbers - low) / (high - low))
             axes.set(xlim=(0.0, 1.0), xlabel="place in the range")
-        axes.set_title(self.source)
+            for name, wished, *values in rows[len(low) :]:
+                title += f"\n{name} {wished}: " + ", ".join(map(" ".join, zip(heads[2:], values, strict=True)))
+        axes.set_title(title, fontsize="medium")
         return axes
 
 
