@@ -78,7 +78,7 @@ class Sizing(Summary, ReadOnlyArrays):
 
     @property
     def title(self) -> str:
-        """Robot and outcome; after a walk of the twin also the model that meets the wishes, and what the twin misses."""
+        """Robot and outcome; after a walk of the twin also the model that meets the wishes, and what it misses."""
         said = f"{self.source}: {self.outcome.sentence}"
         if self.outcome is not Outcome.MET or "twin" not in self.walks:
             return said
