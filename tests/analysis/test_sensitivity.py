@@ -1,6 +1,7 @@
 """What each number of a robot does to its onset of bending, and how sure that is."""
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.stats.qmc import Sobol
 
 from chilopod.analysis import Onset, bifurcations, compare, curved_walks, sensitivity, uncertainty
 from chilopod.analysis.derivatives import derivative
-from chilopod.analysis.parameters import ALL, K1, numbers_read, stiffness
+from chilopod.analysis.parameters import ALL, K1, check_parameter, numbers_read, stiffness
 from chilopod.analysis.quantities import leading_mode
 from chilopod.analysis.uncertainty import sobol_shares
 from chilopod.errors import AnalysisError, ParameterError
@@ -285,3 +286,20 @@ class TestUncertainty:
         ):
             with pytest.raises(ParameterError, match=said):
                 uncertainty(ROBOT, tolerances, **more)
+
+
+@pytest.mark.parametrize(("modules", "inertia"), [(6, None), (9, None), (9, "0.02 kg*m^2")])
+def test_numbers_of_the_twin_are_read_where_they_change_the_planar_robot(modules, inertia):
+    robot = load_robot("aoi2022").with_value("body.modules", modules)
+    robot = robot.override("body.yaw_inertia", inertia) if inertia else robot
+    twin = [path for path in robot.parameters() if path.startswith("twin.") and robot.get(path)]
+    changed = set()
+    for path in twin:
+        with suppress(ParameterError):  # a count of time steps
+            other = robot.with_value(path, 1.001 * robot.get(path))
+            changed |= {path} if other.module_yaw_inertia != robot.module_yaw_inertia else set()
+    assert {path for path in numbers_read(robot) if path.startswith("twin.")} == changed
+    assert len(changed) == (6 if (modules, inertia) == (9, None) else 0)
+    with pytest.raises(ParameterError, match="must be a number that the planar model reads") as caught:
+        check_parameter(robot, "twin.sliding_friction")
+    assert ("twin." in str(caught.value.allowed)) == bool(changed)

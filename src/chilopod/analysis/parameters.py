@@ -5,6 +5,7 @@ from __future__ import annotations
 from chilopod import units
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
+from chilopod.robot.inertia import module_yaw_inertia
 from chilopod.robot.parameters import QUANTITIES
 
 K1 = "springs.stiffness[0]"
@@ -63,6 +64,7 @@ def check_parameter(robot: Robot, parameter: str) -> None:
 
 
 def _read(robot: Robot) -> tuple[str, ...]:
-    """Paths of the numbers that the planar model reads, with those of the twin that set the yaw inertia of a module."""
-    sets_inertia = robot.twin is not None and robot.body.yaw_inertia is None
-    return (*_READ, *(f"twin.{name}" for name in _OF_INERTIA if sets_inertia))
+    """Paths of the numbers that the planar model reads. Those of the twin set the yaw inertia of a module if it is not
+    given and legs and width exceed a uniform rod."""
+    rod = module_yaw_inertia(robot.body, robot.legs, None)
+    return (*_READ, *(f"twin.{name}" for name in _OF_INERTIA if robot.module_yaw_inertia > rod))
