@@ -20,7 +20,7 @@ from chilopod.tasks.course import Driven
 LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
 _ON_WHITE = {"fc": "white", "ec": "none", "pad": 0.4}
 _ARRIVED = Verdict.ARRIVED.label
-_WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is for targets that were reached
+WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is for targets that were reached
 
 
 def draw(done: Driven, narrow: bool = False) -> Figure:
@@ -30,7 +30,7 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
     _floor(axes["A"], record)
     axes["A"].set_title(title(done))
     for robot in reversed(range(record.sizes["robot"])):
-        walk, color = record.isel(robot=robot), _WAYS[robot % len(_WAYS)]
+        walk, color = record.isel(robot=robot), WAYS[robot % len(WAYS)]
         # Of springs that nobody changed the record has one value for all times.
         spring = units.from_si(1.0, "N*mm/deg") * walk.stiffness.isel(joint=0).broadcast_like(walk.time).values
         axes["B"].plot(walk.time, spring, color=color, linewidth=1.2)
@@ -92,7 +92,7 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
     for robot in reversed(range(record.sizes["robot"])):
         walk = record.isel(robot=robot)
         path = walk.position.transpose("time", "axis").values
-        color = _WAYS[robot % len(_WAYS)]
+        color = WAYS[robot % len(WAYS)]
         axes.plot(path[:, 0], path[:, 1], color=color, zorder=3, linewidth=1.8 if robot == 0 else 1.0)
         _goals(axes, walk, named=robot == 0)
     missed = _missed(record.isel(robot=0))

@@ -12,13 +12,14 @@ from matplotlib.patches import Circle
 
 from chilopod import units
 from chilopod.show import style
-from chilopod.show.figures.course import LAYOUTS, bearing
+from chilopod.show.figures.course import LAYOUTS, WAYS, bearing
 from chilopod.show.scene.frames import body_frames
 from chilopod.show.scene.outline import draw_spines
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks import Turn
 
 _STILLS = 5
+_NAMED = 4  # seeds of one colour
 
 
 def draw(done: Turn, narrow: bool = False) -> Figure:
@@ -32,7 +33,7 @@ def draw(done: Turn, narrow: bool = False) -> Figure:
     _floor(axes["A"], done, walks)
     axes["A"].set_title(title(done))
     for robot, walk in enumerate(walks):
-        color = style.CURVES[robot % len(style.CURVES)]
+        color = WAYS[robot % len(WAYS)]
         axes["B"].plot(walk.time, walk.distance, color=color)
         axes["C"].plot(walk.time, bearing(walk), color=color)
     axes["B"].axhline(ARRIVAL_RADIUS, color=style.GREY, linestyle=(0, (4, 2)), linewidth=1.2)
@@ -68,8 +69,8 @@ def _floor(axes: Axes, done: Turn, walks: Sequence[xr.Dataset]) -> None:
         axes.plot(x, y, color=style.GREY, linestyle=(0, (1, 2)), label=label)
     for robot, walk in enumerate(walks):
         place = walk.position.transpose("time", "axis").values
-        name = "path of module 1" if robot == 0 else None
-        axes.plot(place[:, 0], place[:, 1], color=style.CURVES[robot % len(style.CURVES)], label=name, zorder=3)
+        name = _named(done.labels[robot :: len(WAYS)]) if robot < len(WAYS) else None
+        axes.plot(place[:, 0], place[:, 1], color=WAYS[robot % len(WAYS)], label=name, zorder=3)
     end = float(done.criteria.arrival[0])
     if not np.isfinite(end):
         end = float(record.time[np.isfinite(record.heading.values[:, 0])][-1])
@@ -81,3 +82,9 @@ def _floor(axes: Axes, done: Turn, walks: Sequence[xr.Dataset]) -> None:
         *target, "+", color=style.SCENE["target"], markersize=9, markeredgewidth=2, label="target", linestyle="none"
     )
     style.finish(axes, legend="best", xlabel="x (m)", ylabel="y (m)")
+
+
+def _named(seeds: Sequence[str]) -> str:
+    """Name of the paths of one colour, by the seeds of their walks."""
+    said = ", ".join([*seeds[:_NAMED], *["…"] * (len(seeds) > _NAMED)])
+    return f"module 1, seed {said}" if said != "-" else "path of module 1"
