@@ -144,6 +144,11 @@ def test_bad_input_is_one_line_that_names_it(parameter, between, expected):
         (("aoi2022", "--engine", "mine:engine"), "has no state that can be divided by its place"),
         (("aoi2022", "--engine", "twin", "--amplitude", "3 deg/s"), "--amplitude"),
         (("aoi2022", "--engine", "twin", "--amplitude", "3 rad"), "must be a small angle"),
+        (
+            ("aoi2022", "--engine", "twin", "--amplitude", "0 deg"),
+            "= '0 deg': must be a small angle; allowed: 1e-08 rad",
+        ),
+        (("aoi2022", "--engine", "twin", "--amplitude", "1e-9 rad"), "must be a small angle; allowed: 1e-08 rad"),
         ((PRESET, "--onset", K1, "5 N*mm/deg", "30 N*mm/deg"), "must be 'twin' for --onset"),
         (
             ("aoi2022", "--engine", "twin", "--onset", K1, "75 N*mm/deg", "20 N*mm/deg"),

@@ -45,7 +45,8 @@ _SETTLING, _STALLED = 30, 120  # cycles: to settle, and more where feet have dec
 _CLOSING, _TRIED, _MEMORY = 150, 30, 30  # cycles of Anderson's method: most, those if it comes no nearer, that it keeps
 _NEARER, _APART = 300, 0.75  # cycles in which a walk comes nearer to a fixed point that it settles into; part left
 _CLOSED = 1e-11  # m, rad, per second
-_STEPS = (1e-7, 1e-8)  # of the differences; the first that changes no contact
+LEAST = 1e-8  # size of a bend
+_STEPS = (1e-7, LEAST)  # of the differences; the first that changes no contact
 _ROUNDING = float(np.finfo(float).eps)
 _SHORTER, _KINK, _ACROSS = 0.25, 1e-3, 4  # second step over the first; least change of slopes; directions across
 _LARGEST, _HALVINGS = 1e-2, 4  # bends, rad
@@ -99,8 +100,8 @@ def _found(
     name: str, cycle: CycleMap, start: Array, bends: Sequence[str], amplitude: float, cycles: int, straight: bool
 ) -> CycleMultipliers:
     """Multipliers of :func:`cycle_multipliers`, and whether a walk that is to be straight has given way."""
-    if not (isinstance(amplitude, Real) and _STEPS[-1] <= amplitude < 1.0):
-        allowed = f"{_STEPS[-1]:g} or more, which rounding does not hide, below 1, in the unit of the bends (rad)"
+    if not (isinstance(amplitude, Real) and LEAST <= amplitude < 1.0):
+        allowed = f"{LEAST:g} or more, which rounding does not hide, below 1, in the unit of the bends (rad)"
         raise ParameterError("must be a small number", field="amplitude", value=amplitude, allowed=allowed)
     checked_count("cycles", cycles, _MOST_CYCLES, 3 * _BLOCK)
     at = _indices(cycle, bends)

@@ -60,8 +60,10 @@ def stability(
         raise ParameterError("must be 'twin' for --onset", field="engine", value=engine, allowed="chilopod bifurcation")
     if engine == "planar" and amplitude is not None:
         raise ParameterError("must be 'twin' for --amplitude", field="engine", value=engine)
-    if not 0.0 < size < 1.0:
-        allowed = "above 0, below 1 rad"
+    from chilopod.analysis.cycle_multipliers import LEAST
+
+    if not LEAST <= size < 1.0:
+        allowed = f"{LEAST:g} rad or more, which rounding does not hide, below 1 rad"
         raise ParameterError("must be a small angle", field="amplitude", value=amplitude, allowed=allowed)
     with progress_bar("stability") as show:
         if engine == "planar":
