@@ -259,7 +259,7 @@ def test_seeds_may_be_one_each_and_numpy_s():
     alone = gymnasium.make(TURN).unwrapped
     np.testing.assert_array_equal(first[0], alone.reset(seed=np.array(3))[0])
     wrong = [(batch, [3]), (batch, "ab"), (batch, b"ab"), (batch, "a"), (batch, [-1, 2])]
-    for env, seed in [*wrong, *((each, one) for each in (batch, alone) for one in (1.5, -1, "a", {}))]:
+    for env, seed in [*wrong, *((each, one) for each in (batch, alone) for one in (1.5, -1, "a", {}, True))]:
         with pytest.raises(ParameterError, match="seed") as caught:
             env.reset(seed=seed)
         assert "\n" not in str(caught.value)
