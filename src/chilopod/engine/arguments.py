@@ -53,7 +53,8 @@ def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
     if seeds is None:
         return None
     try:
-        whole = [operator.index(None if isinstance(each, bool) else each) for each in seeds]  # type: ignore[attr-defined]
+        given: Any = seeds
+        whole = [-1 if isinstance(each, bool) else operator.index(each) for each in given]
     except TypeError:
         whole = []
     require(whole and min(whole) >= 0, "must be whole numbers, one for each walk", name, seeds, "0 or more")

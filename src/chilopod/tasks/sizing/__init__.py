@@ -172,8 +172,8 @@ class Sizing(Summary, ReadOnlyArrays):
             names = ["\n".join(row[:3]) for row in rows[: len(low)]]
             axes.barh(names, (self.numbers - low) / (high - low))
             axes.set(xlim=(0.0, 1.0), xlabel="place in the range")
-            for name, wished, *values in rows[len(low) :]:
-                title += f"\n{name} {wished}: " + ", ".join(map(" ".join, zip(heads[2:], values, strict=True)))
+            for name, wished, *found in rows[len(low) :]:
+                title += f"\n{name} {wished}: " + ", ".join(map(" ".join, zip(heads[2:], found, strict=True)))
         axes.set_title(title, fontsize="medium")
         return axes
 
