@@ -31,9 +31,7 @@ from chilopod.trials import run
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_AS_COMPUTED = (
-    0.02  # largest deviation of radius and speed of a planar walk from those computed, of a twin's from a wish
-)
+_AS_COMPUTED = 0.02  # largest deviation of radius and speed: of a planar walk from those computed, a twin's from a wish
 _OF_WALK = {"radius": "axis_radius", "speed": "speed"}  # names of wished quantities in the end of a walk
 _SETTLED = 15.0  # settling times of a walk
 _MOST = 1500.0  # gait cycles of a walk, 15 minutes of the paper's robot
