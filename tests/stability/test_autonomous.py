@@ -1,12 +1,16 @@
 """Orbits of systems that do not depend on time: unknown period, one multiplier that is always 1."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
+    BranchPoint,
     Ending,
     Event,
     Kind,
@@ -403,3 +407,92 @@ def test_a_state_on_an_orbit_keeps_it_with_a_wrong_period(factor):
     found = find_orbit(system(factor * exact.period), exact.state, with_error=False)
     assert found.period == pytest.approx(exact.period, rel=1e-9)
     np.testing.assert_allclose(found.state, exact.state, atol=1e-8)
+
+
+def van_der_pol(mu):
+    return from_rhs(lambda t, x: [x[1], mu * (1 - x[0] ** 2) * x[1] - x[0]], 2, None, guess_period=6.6)
+
+
+def bits(branch):
+    points = [(each.value, each.period, each.error_bound, each.special, *each.orbit) for each in branch.points]
+    return points, branch.ending, branch.reason, branch.step, branch.remarks
+
+
+def test_a_branch_of_cycles_in_pieces_is_that_in_one():
+    between, start = (1.0, 8.0), begin(van_der_pol, 1.0, [2.0, 0.0])
+    whole, piece = (follow(van_der_pol, start, between, points=points) for points in (8, 4))
+    assert bits(follow(van_der_pol, piece, between, points=4)) == bits(whole)
+    pieces = follow(van_der_pol, start, between, budget=60)
+    while len(pieces.points) < len(whole.points):
+        assert pieces.ending is Ending.BUDGET
+        pieces = follow(van_der_pol, pieces, between, budget=60)
+    assert bits(pieces)[0][: len(whole.points)] == bits(whole)[0]
+    anew = follow(van_der_pol, replace(piece, anchor=None), between, points=4)
+    assert [each.value for each in anew.points] == pytest.approx([each.value for each in whole.points], rel=1e-9)
+
+
+@pytest.mark.parametrize("factor", [0.1, 10.0])
+def test_a_branch_goes_on_from_a_point_in_other_units(factor):
+    """Its tangent there is that along the section in these units, not in those of the point."""
+    start = begin(van_der_pol, 2.0, [0.5, 2.8])
+    point = follow(van_der_pol, start, (1.0, 8.0), points=1).points[0]
+    units = point.units * [factor, 1.0, 1.0]
+    tangent = point.tangent * point.units / units
+    other = replace(point, units=units, tangent=tangent / np.linalg.norm(tangent))
+    first, last = follow(van_der_pol, other, (1.0, 8.0), points=1, step=1e-4).points
+    moved = (np.append(last.orbit, last.value) - np.append(first.orbit, first.value)) / units
+    assert moved / np.linalg.norm(moved) == pytest.approx(first.tangent, abs=1e-2)
+
+
+@pytest.mark.parametrize("points", [13, 16])
+def test_a_cycle_that_shrinks_in_pieces_ends_where_one_does_in_one(points):
+    """r^2 = mu: the largest motion is that of the earlier pieces."""
+
+    def family(mu):
+        return from_rhs(lambda t, x: [*(mu - x @ x) * x + np.array([-x[1], x[0]])], 2, None, guess_period=2 * np.pi)
+
+    start = begin(family, 0.5, [np.sqrt(0.5), 0.0], rising=False)
+    pieces = follow(family, follow(family, start, (-0.5, 0.5), points=points), (-0.5, 0.5))
+    assert bits(pieces) == bits(follow(family, start, (-0.5, 0.5)))
+    assert "Hopf" in pieces.reason
+
+
+@pytest.mark.parametrize(
+    ("value", "orbit", "multiplier", "tangent", "period"),
+    [
+        (
+            3.522760239814641, [-0.3135294289407823, -0.09525690475403274, 3.5400921431527728], -0.83373571581753,
+            [-0.003598288687454264, 0.0039045197348393794, -0.9999253515370717, -0.0110044717104258],
+            31.004911327935183,
+        ),
+        (
+            3.1593902971757033, [-0.31153583821991104, -0.09494383918542362, 3.1703235484657797], -5.83524414848993,
+            [0.010322726438960306, 0.0038993966269151668, -0.9998866448869307, -0.010243700579841971],
+            47.14044227963879,
+        ),
+        (
+            2.611465672571466, [-0.2976379303681251, -0.09440362914069594, 2.57335020732535], -33978.16609053449,
+            [0.019943299807079536, 0.004397254371342856, -0.9997439563384144, -0.009744255326313742],
+            173.86621067214995,
+        ),
+    ],
+)  # fmt: skip
+def test_a_branch_goes_on_from_a_point_whose_returns_magnify(value, orbit, multiplier, tangent, period):
+    """Of the bursts of Hindmarsh & Rose (1984), far from a fold, which needs a multiplier of +1."""
+
+    def rhs(current):
+        return lambda t, x: [
+            x[1] - x[0] ** 3 + 3.0 * x[0] ** 2 - x[2] + current,
+            1.0 - 5.0 * x[0] ** 2 - x[1],
+            0.006 * (4.0 * (x[0] + 1.6) - x[2]),
+        ]
+
+    units = np.array([0.051788298499435344, 0.00872558510103503, 0.03772742967541175, 3.5])
+    point = BranchPoint(value, np.array(orbit), np.array([multiplier, 0j]), np.array(tangent), units, period=period)
+    branch = follow(lambda current: from_rhs(rhs(current), 3, None, guess_period=20.0), point, (1.5, 5.0), points=1)
+    assert (branch.ending, branch.remarks, len(branch.points)) == (Ending.ENOUGH_POINTS, (), 2)
+    last = branch.points[-1]
+    assert last.value - value == pytest.approx(0.02 * 3.5 * tangent[-1], rel=0.02)
+    how = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-12}
+    closed = solve_ivp(rhs(last.value), (0.0, last.period), last.orbit, **how).y[:, -1]
+    assert closed == pytest.approx(last.orbit, abs=1e-10 * max(1.0, abs(multiplier)))

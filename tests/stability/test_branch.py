@@ -68,6 +68,34 @@ def logistic(r):
     return from_map(lambda x: (r * x * (1.0 - x), [[r - 2.0 * r * x[0]]]), 1)
 
 
+def test_steep_returns_in_pieces_as_in_one():
+    """0 = exp(20 p) - 1 - 1.5 x - x^3: steps of differences by the parameter depend on the step before."""
+
+    def family(p):
+        return from_map(lambda x: (np.exp(20.0 * p) - 1.0 - 0.5 * x - x**3, [[-0.5 - 3.0 * x[0] ** 2]]), 1)
+
+    whole, piece = (follow(family, [0.0], (0.0, 1.0), points=points) for points in (16, 8))
+    pieces = follow(family, piece, (0.0, 1.0), points=8)
+    assert [point.orbit.tolist() for point in pieces.points] == [point.orbit.tolist() for point in whole.points]
+    for point in whole.points:
+        assert np.expm1(20.0 * point.value) == pytest.approx(1.5 * point.orbit[0] + point.orbit[0] ** 3, rel=1e-8)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-9])
+@pytest.mark.parametrize("slope", [1.0, -1.0])
+@pytest.mark.parametrize("rising", [True, False])
+def test_a_straight_curve_has_no_fold_in_any_units(size, slope, rising):
+    """x = 2 slope p, with the multiplier 1/2: the parameter goes where it was asked to."""
+
+    def family(p):
+        return from_map(lambda x: (0.5 * x + slope * p, [[0.5]]), 1, scale=[size])
+
+    branch = follow(family, begin(family, 0.3, [0.6 * slope], rising), (-1.0, 1.0), points=2)
+    assert branch.remarks == ()
+    assert (branch.points[1].value > 0.3) is rising
+    assert branch.points[1].orbit[0] == pytest.approx(2.0 * slope * branch.points[1].value, rel=1e-12)
+
+
 # Spent in a step, and while the step with the period doubling is searched.
 @pytest.mark.parametrize("budget", [100, 158, 206])
 def test_a_budget_changes_no_point(budget):

@@ -11,7 +11,7 @@ import contextlib
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from numbers import Real
 from typing import TYPE_CHECKING
@@ -24,7 +24,7 @@ from chilopod.flows.arguments import UserCode, check_arguments, checked_interval
 from chilopod.flows.deadline import Budget
 from chilopod.frozen import Array
 from chilopod.notebook import picture
-from chilopod.stability.branches.branch_points import IN_FOLD, PRECISION, Anchor, BranchPoint, OnCurve
+from chilopod.stability.branches.branch_points import PRECISION, Anchor, BranchPoint, OnCurve, in_fold
 from chilopod.stability.branches.branch_starts import Start, anchored, begin, branch_sizes, check_symmetric, switch
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.inspection import Inspected, by_energy, inspect
@@ -70,6 +70,8 @@ class Branch(Result):
         Number of the systems' periods in one period of its orbits; True if these have the systems' symmetry in time.
     remarks
         Sentences on events that remained undecided.
+    anchor
+        What a continuation needs beside the points; found anew if None.
     """
 
     points: tuple[BranchPoint, ...]
@@ -79,6 +81,7 @@ class Branch(Result):
     symmetric: bool = False
     reason: str = ""
     remarks: tuple[str, ...] = ()
+    anchor: Anchor | None = field(default=None, repr=False)
 
     @property
     def units(self) -> Array:
@@ -186,16 +189,15 @@ def follow(
 ) -> Branch:
     """Follow a branch from a point along its tangent, or from its end; an AnalysisError if no orbit is found there.
 
-    The points of a continued branch equal those of a single run to round-off; for a system without a period of its own
-    they are other points of the same curve, as the last section is rebuilt. A closed branch cannot be continued.
+    The points of a continued branch equal those of a single run to the bit. A closed branch cannot be continued.
 
     Parameters
     ----------
     family
         ``family(value)`` is the system.
     start
-        Start from :func:`begin` or :func:`switch`, a point of another branch, an orbit (or a guess) at the lower end of
-        the interval, or a branch, which is continued in its own units, with its own ``symmetric``.
+        Start from :func:`begin` or :func:`switch`, a point of another branch, with the units of its states, an orbit
+        (or a guess) at the lower end of the interval, or a branch, continued in its units with its ``symmetric``.
     between
         Interval of the parameter, at whose ends the branch ends; its width becomes the scale of a new branch.
     points
@@ -238,7 +240,7 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
         raise ParameterError("must contain the start", field="between", value=curve.between, allowed=f"{start.value}")
     curve.periods = start.periods
     check_symmetric(curve.system(start.value), curve.symmetric)
-    curve.sizes = branch_sizes(curve, start)
+    curve.sizes = branch_sizes(curve, start) if isinstance(start, Start) else start.units[:-1]
     if isinstance(start, Start):
         inward = dict(zip(curve.between, (True, False), strict=True))
         anchor = anchored(curve, replace(start, rising=inward.get(start.value, start.rising)), step)
@@ -246,8 +248,7 @@ def opened(curve: Curve, start: Start | BranchPoint, step: float) -> tuple[Branc
         meeting = start.special not in (None, Kind.FOLD) and float(np.abs(start.multipliers - 1.0).min()) <= _MEETING
         first = replace(_in_units(start, curve.units), special=start.special if meeting else None)
         anchor = curve.anchor(first, ahead=step if meeting else 0.0)
-    in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
-    remarks = (_IN_FOLD,) if in_fold else ()
+    remarks = (_IN_FOLD,) if anchor.last.special is None and in_fold(anchor.matrix, anchor.last.tangent) else ()
     return Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, curve.symmetric, remarks=remarks), anchor
 
 
@@ -271,13 +272,14 @@ def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anc
     n, allowed = curve.system(end.value).dimension, f"{end.orbit.size}"
     if n != end.orbit.size:
         raise ParameterError("must have the branch's dimension", field="family", value=n, allowed=allowed)
+    step = min(branch.step, longest) if longest < LONGEST else branch.step  # those along straight parts are longer
+    if branch.anchor is not None and branch.anchor.last.value == end.value:
+        return replace(branch, step=step), branch.anchor
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     # At a branch point the matrix is singular, so it is computed a step ahead.
     ahead = 0.0 if last.special is None else branch.step
     before = next((point for point in earlier[:1] if np.array_equal(point.units, last.units)), None)
-    anchor = curve.anchor(last, before, ahead)
-    # Steps along straight parts are longer than the longest.
-    return (replace(branch, step=min(branch.step, longest)) if longest < LONGEST else branch), anchor
+    return replace(branch, step=step), curve.anchor(last, before, ahead)
 
 
 def followed(
@@ -293,23 +295,23 @@ def followed(
     """A branch with the points that follow an anchor; it also ends past a special point of the kind ``until``."""
     curve.first, curve.long_steps = _in_units(branch.points[0], curve.units), longest >= LONGEST
     found, remarks, done, reached = list(branch.points), list(branch.remarks), 0, False
+    moved, size = anchor, branch.step
 
-    def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Inspected, BranchPoint], Ending | None]:
+    def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Inspected, Anchor], Ending | None]:
         nonlocal reached
-        within, end = inspect(curve, step, closely), step.end.last
+        within, end = inspect(curve, step, closely), step.end
         reached = until is not None and any(point.special is until for point in within.points)
-        return (within, end), Ending.ENOUGH_POINTS if reached or _outgrown(curve, [*found, end]) else ending
+        return (within, end), Ending.ENOUGH_POINTS if reached or _outgrown(curve, [*found, end.last]) else ending
 
-    def keep(looked: tuple[Inspected, BranchPoint], _: int) -> None:
-        nonlocal done
-        within, end = looked
-        found.extend([*within.points, end])
+    def keep(looked: tuple[Inspected, Anchor], _: int) -> None:
+        nonlocal done, moved
+        within, moved = looked
+        found.extend([*within.points, moved.last])
         remarks.extend(within.remarks)
         done += 1
         with UserCode("progress"):
-            progress(done, end)
+            progress(done, moved.last)
 
-    moved, size = anchor, branch.step
     while True:
         before, left = done, points and points - done
         ending, reason, size = trace(curve, moved, (size, longest), left, look, keep)
@@ -332,7 +334,7 @@ def followed(
     if by_energy([point.value for point in found], curve.scale):
         remarks = [remark for remark in remarks if remark != _IN_FOLD]
     said = tuple(dict.fromkeys([*remarks, *_unpaired_folds(found)]))
-    return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)
+    return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said, anchor=moved)
 
 
 def _outgrown(curve: Curve, points: list[BranchPoint]) -> bool:

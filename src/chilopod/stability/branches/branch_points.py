@@ -11,7 +11,7 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
-from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays
+from chilopod.frozen import Array, ComplexArray, ReadOnlyArrays, read_only
 from chilopod.stability import returns
 from chilopod.stability.continuation.equations import Before
 from chilopod.stability.interface import Family, SystemLike, system_of
@@ -73,6 +73,7 @@ class Anchor(ReadOnlyArrays):
     space: Array | None = None  # projection onto the states with the orbit's spatial symmetries, if any, shape (n, n)
     leaving: bool = False  # True at a branch point: the matrix then belongs to a place ahead
     lengthening: float = 0.0  # relative change of the period along the curve
+    motion: float = 0.0  # largest motion within a period so far, in units
 
     @property
     def tangent(self) -> Array:
@@ -80,7 +81,7 @@ class Anchor(ReadOnlyArrays):
 
     @property
     def values(self) -> Array:
-        return np.array([self.last.value])
+        return read_only(np.array([self.last.value]))
 
 
 class Returned(NamedTuple):
@@ -144,8 +145,17 @@ def null_vector(bordered: Array) -> Array:
     return tangent / np.linalg.norm(tangent)
 
 
+def in_fold(matrix: Array, tangent: Array) -> bool:
+    """True if a curve turns at a point, within its error: a multiplier is +1. In tiny units of the states the parameter
+    hardly changes anywhere."""
+    if abs(tangent[-1]) > _IN_FOLD:
+        return False
+    away = np.abs(np.linalg.eigvals(matrix[: tangent.size - 1, :-1])).min()
+    return bool(away <= math.sqrt(_IN_FOLD))
+
+
 PRECISION = 1e-12  # default precision of orbits, relative to the sizes of the states; the flow's accuracy limits it
-IN_FOLD = 1e-6  # component of a unit tangent along the parameter, within the start's error, of a start in a fold
+_IN_FOLD = 1e-6  # component of a unit tangent along the parameter in a fold, within the start's error
 _PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
 _STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink
 _KEPT = 8  # cached systems: making one may cost more than a flow

@@ -32,7 +32,7 @@ from chilopod.stability.continuation.equations import Before, Corrected, Equatio
 from chilopod.stability.continuation.tolerances import RETRY, SETTLED, SHARPEST_TURN, SHORTEST
 from chilopod.stability.equilibria import SHRINKS, SHRUNK, has_shrunk
 from chilopod.stability.floquet import full_period
-from chilopod.stability.interface import is_autonomous, offers
+from chilopod.stability.interface import is_autonomous, offers, returns_per_period
 from chilopod.stability.orbits.orbit import rounds_in
 from chilopod.stability.orbits.shooting import FEW_ROUNDS, Free, Problem, node_count, nodes_along, shot
 from chilopod.stability.returns import ReturnMap, Section
@@ -54,7 +54,6 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
 
     first: BranchPoint  # first point of the curve
     long_steps = False  # True if no step shorter than the default one is wanted
-    _motion = 0.0  # largest motion within a period so far
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
@@ -81,6 +80,11 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def anchor(self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0) -> Anchor:
         """The anchor of a point; at a branch point its matrix is computed ``ahead`` along the tangent, or less far."""
         section = self.section_at(last.orbit, last.value, last.period)
+        if section is not None:  # that of the point may be another one, if its units were
+            tangent = np.append(self._projection(section) @ last.tangent[:-1], last.tangent[-1])
+            last = replace(last, tangent=tangent / np.linalg.norm(tangent))
+        magnified = float(np.abs(last.multipliers).max(initial=0.0))
+        self.steepness = max(1.0, magnified ** (1.0 / returns_per_period(self.system(last.value))))
         x = last.orbit + ahead * last.tangent[:-1] * self.sizes
         try:
             # With errors, to be equal to the end of a step, to the bit.
@@ -89,10 +93,8 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             if ahead <= SHORTEST:
                 raise
             return self.anchor(last, before, RETRY * ahead)
-        earlier = None
         # The matrix of a branch point was computed ahead, so it gives no prediction.
-        if before is not None and before.special is None:
-            earlier = Anchor(before, self.matrix_at(before.orbit, before.value, section, before.tangent, True)[1])
+        earlier = None if before is None or before.special is not None else self.anchor(before)
         return self.anchored(last, matrix, section, earlier, ahead > 0.0)
 
     def anchored(
@@ -109,7 +111,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             assert last.period is not None
             assert earlier.period is not None
             lengthening = (last.period - earlier.period) / last.period / float(np.linalg.norm(back))
-            along = self._projection(returns.velocity_at(system, section.point), section)
+            along = self._projection(section)
             back[:-1], tangent[:-1] = along @ back[:-1], along @ tangent[:-1]
         return Anchor(last, matrix, Before(back, tangent, before.matrix), section, space, leaving, lengthening)
 
@@ -281,12 +283,11 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """A step with the anchor at its end, on the section there."""
         anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
-        tangent, matrix, system = step.tangent, step.matrix, self.system(value)
+        tangent, matrix, system, motion = step.tangent, step.matrix, self.system(value), 0.0
         section = returns.section_at(system, x, self.sizes, image.duration)
         if section is not None and anchor.section is not None and is_autonomous(system):
-            velocity = returns.velocity_at(system, x)
-            self._check_moving(anchor.section, velocity, step.found)
-            along = self._projection(velocity, section)
+            motion = self._checked_motion(anchor, anchor.section, step.found)
+            along = self._projection(section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]
             tangent /= np.linalg.norm(tangent)
@@ -296,16 +297,16 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             matrix[-1] = tangent
         point = BranchPoint(value, x, values, tangent, self.units, None, image.period, bound, periods=self.periods)
         before = None if anchor.leaving or anchor.last.special is not None else anchor
-        return replace(step, end=self.anchored(point, matrix, section, before))
+        return replace(step, end=replace(self.anchored(point, matrix, section, before), motion=motion))
 
-    def _check_moving(self, section: Section, velocity: Array, found: OnCurve) -> None:
-        """Check that an orbit has not shrunk into an equilibrium, beyond which the same orbits come again half a period
-        later. A fraction f of the largest motion lies at a distance f^2 in the parameter from the Hopf point, and the
-        precision leaves that uncertain by an f-th part."""
+    def _checked_motion(self, anchor: Anchor, section: Section, found: OnCurve) -> float:
+        """Largest motion so far. Check that an orbit has not shrunk into an equilibrium, beyond which the same orbits
+        come again half a period later. A fraction f of the largest motion lies at a distance f^2 in the parameter from
+        the Hopf point, and the precision leaves that uncertain by an f-th part."""
+        velocity = returns.velocity_at(self.system(found.value), found.x)
         motion = float(np.linalg.norm(velocity / self.sizes)) * found.image.period
-        self._motion = max(self._motion, motion)
-        if float(section.normal @ velocity) > 0.0 and motion >= SHRUNK * np.cbrt(self.precision) * self._motion:
-            return
+        if float(section.normal @ velocity) > 0.0 and motion >= SHRUNK * np.cbrt(self.precision) * anchor.motion:
+            return max(anchor.motion, motion)
         self.budget.take()
         if has_shrunk(self.system(found.value), found.x, self.sizes, motion, found.image):
             raise AnalysisError(f"{SHRINKS}: a Hopf point", field="orbit")
@@ -346,7 +347,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
     def _relative_size(self, x: Array) -> float:
         return float(np.abs(x / self.sizes).max())
 
-    def _projection(self, velocity: Array, section: Section) -> Array:
-        """Projection along the motion onto a section, in units, shape (n, n)."""
-        across = np.outer(velocity / self.sizes, section.normal * self.sizes)
-        return np.eye(velocity.size) - across / float(section.normal @ velocity)
+    def _projection(self, section: Section) -> Array:
+        """Projection onto a section along the motion at its point, in units, in which both are at right angles."""
+        normal = section.normal * self.sizes
+        return np.eye(normal.size) - np.outer(normal, normal)

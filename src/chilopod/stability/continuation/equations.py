@@ -13,11 +13,12 @@ import numpy as np
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.deadline import Budget
-from chilopod.frozen import Array
+from chilopod.frozen import Array, ReadOnlyArrays
 from chilopod.stability.continuation import tolerances
 
 
-class Before(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Before(ReadOnlyArrays):
     """The previous point in coordinates of an anchor: displacement, unit tangent and, if useful, the matrix."""
 
     moved: Array
