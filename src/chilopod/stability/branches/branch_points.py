@@ -148,14 +148,14 @@ def null_vector(bordered: Array) -> Array:
 def in_fold(matrix: Array, tangent: Array) -> bool:
     """True if a curve turns at a point, within its error: a multiplier is +1. In tiny units of the states the parameter
     hardly changes anywhere."""
-    if abs(tangent[-1]) > _IN_FOLD:
+    if abs(tangent[-1]) > IN_FOLD:
         return False
     away = np.abs(np.linalg.eigvals(matrix[: tangent.size - 1, :-1])).min()
-    return bool(away <= math.sqrt(_IN_FOLD))
+    return bool(away <= math.sqrt(IN_FOLD))
 
 
 PRECISION = 1e-12  # default precision of orbits, relative to the sizes of the states; the flow's accuracy limits it
-_IN_FOLD = 1e-6  # component of a unit tangent along the parameter in a fold, within the start's error
+IN_FOLD = 1e-6  # component of a unit tangent along the parameter in a fold, within the start's error
 _PARAMETER_STEP = 1e-6  # step of differences, in units of the scale
 _STEEP = 10.0  # approximate change of the return over that of the parameter, in units, beyond which steps shrink
 _KEPT = 8  # cached systems: making one may cost more than a flow

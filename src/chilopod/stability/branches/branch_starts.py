@@ -19,7 +19,7 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.flows.arguments import UserCode, check_arguments, finite_array
 from chilopod.flows.deadline import Deadline
 from chilopod.frozen import Array, ReadOnlyArrays
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, in_fold, symmetric_space, within_space
+from chilopod.stability.branches.branch_points import IN_FOLD, Anchor, BranchPoint, symmetric_space, within_space
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.interface import (
@@ -352,7 +352,7 @@ def _along(matrix: Array, rising: bool) -> Array:
         raise AnalysisError(said, field="start", allowed=other)
     tangent: Array = rows[-1]
     # At a fold the parameter does not rise: the largest part of the state gives the direction.
-    along = tangent[np.abs(tangent).argmax()] if in_fold(matrix, tangent) else tangent[-1]
+    along = tangent[-1] if abs(tangent[-1]) > IN_FOLD else tangent[np.abs(tangent).argmax()]
     return tangent if bool(along > 0.0) is rising else -tangent
 
 
