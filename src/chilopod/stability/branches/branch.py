@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from numbers import Real
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -81,7 +81,7 @@ class Branch(Result):
     symmetric: bool = False
     reason: str = ""
     remarks: tuple[str, ...] = ()
-    anchor: Anchor | None = field(default=None, repr=False)
+    anchor: Any = field(default=None, repr=False)  # an Anchor
 
     @property
     def units(self) -> Array:
@@ -319,7 +319,8 @@ def followed(
         if ending is Ending.ENOUGH_POINTS and done > before and not reached and _outgrown(curve, found):
             moved = _renewed(curve, last)
             found[-1] = moved.last
-            size = min(longest, size * float(np.linalg.norm(last.tangent * last.units / curve.units)))
+            size *= float(np.linalg.norm(last.tangent * last.units / curve.units))  # the same length in other units
+            size = size if curve.long_steps else min(longest, size)
             continue
         beside = None
         if ending is Ending.LOST:
