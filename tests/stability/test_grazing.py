@@ -108,6 +108,15 @@ def test_passages_of_events_are_counted_that_depend_on_states():
     assert list(forced(0.5).flow_events(start, 0.0, 2.0 * np.pi)) == []
 
 
+def test_an_event_that_comes_too_late_for_a_return_is_no_grazing():
+    """A body with the speed v is at 1 at the time 1 / v, which passes the end of the period, 1, as v passes 1."""
+    slowed = Event(lambda t, x: x[0] - 1.0, lambda t, x: [x[0], 0.5 * x[1]], 1)
+    moving = from_rhs(lambda t, x: [x[1], 0.0 * x[1]], 2, 1.0, events=[slowed])
+    ahead = lambda distance: (moving, np.array([0.0, 1.05 - 1e4 * distance]))  # noqa: E731
+    assert [moving.flow_events(ahead(distance)[1], 0.0, 1.0).tolist() for distance in (0.0, 1e-5)] == [[1.0], [0.0]]
+    assert event_beside(*ahead(0.0), 1.0, ahead) == ""
+
+
 def test_a_system_without_events_is_told_of_none():
     """A return jumps beside an orbit, as one that grows by e^T just ahead; the right-hand sides are linear."""
 

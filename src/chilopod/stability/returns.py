@@ -49,6 +49,7 @@ _HIDDEN = 1e-3  # change in both halves, relative to that in the whole, that sho
 _PARTS = 0.382, 0.236, 0.764  # parts of a return at which an orbit may begin instead
 BESIDE = 1e-6  # displacement at which the change of the derivative is computed, relative to the sizes of the states
 _NEIGHBOURS = 1e-10 * np.cos(np.arange(9.0))  # uneven distances of neighbours, relative to the sizes of the states
+_ROUND_END = 0.99, 1.01  # times just before and after a return, relative to it
 _PAST = 1.5e-5  # distance along a curve, in its units, at which an orbit is past a grazing
 JUMPS = 0.01  # least jump of a derivative in units, relative to it, at a grazing that changes the events of a return
 _JUMPS, _HALVINGS = 0.3, 20  # the same where events are not known, and halvings to the place: half if they are
@@ -350,9 +351,12 @@ def event_beside(system: SystemLike, x: Array, time: float, ahead: Callable[[flo
     """Sentence on the event at which a curve of orbits ends; empty without one. The system and a state are given as
     functions of the distance along the curve from its last orbit."""
 
+    def events(distance: float, part: float = 1.0) -> tuple[float, ...]:
+        return events_in(*ahead(distance), part * time)
+
     def seen(distance: float) -> tuple[tuple[float, ...], Array]:
         there, state = ahead(distance)  # without the event the motion may never return
-        return events_in(there, state, time), checked_flow(there, state, 0.0, time)[1] * size / size[:, None]
+        return events(distance), checked_flow(there, state, 0.0, time)[1] * size / size[:, None]
 
     with contextlib.suppress(ChilopodError):
         size = sizes(system, x, time)
@@ -360,7 +364,14 @@ def event_beside(system: SystemLike, x: Array, time: float, ahead: Callable[[flo
             return EVENT_AT_ZERO
         # A very unstable orbit meets other events on both sides.
         if has_events(system, x, time) and jumps_within(seen, 0.0, _PAST) and not jumps_within(seen, 0.0, -_PAST):
-            return GRAZES if seen(0.0)[0] != seen(_PAST)[0] else JUMPS_AHEAD
+            low, high = 0.0, _PAST
+            if events(low) == events(high):
+                return JUMPS_AHEAD
+            for _ in range(_CLOSER):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if events(middle) == events(0.0) else (low, middle)
+            # An event that is late, as where a motion slows down, passes the end of the time instead.
+            return GRAZES if any(events(low, part) != events(high, part) for part in _ROUND_END) else ""
     return ""
 
 
