@@ -129,6 +129,19 @@ def turning(speed):
     return from_rhs(rhs, 4, None, args=(speed,), guess_period=400.0)
 
 
+@pytest.mark.parametrize("part", [0.5, 0.5001, 0.501, 0.502, 0.51, 1.0, 2.0])
+def test_a_state_on_an_orbit_gives_that_orbit_by_a_guess_from_half_its_period_on(part):
+    """Cycles r^2 = (1 - sqrt(0.6)) / 2, unstable, and (1 + sqrt(0.6)) / 2, of r' = r (r^2 - r^4 - 0.1)."""
+
+    def rhs(t, x):
+        rate = -0.1 + (x[0] ** 2 + x[1] ** 2) - (x[0] ** 2 + x[1] ** 2) ** 2
+        return [rate * x[0] - x[1], rate * x[1] + x[0]]
+
+    inner = 0.5 * (1.0 - np.sqrt(0.6))
+    found = multipliers(from_rhs(rhs, 2, None, guess_period=part * 2.0 * pi), [np.sqrt(inner), 0.0])
+    assert found.values == pytest.approx([np.exp(4.0 * pi * inner * (1.0 - 2.0 * inner))], rel=1e-9)
+
+
 def test_where_the_period_falls_fast():
     """Just beside its start at infinity: within a step the second round ends where the first one was expected to."""
     branch = follow(turning, [-1.0, 0.0, 0.0, 0.0], (1.01, 3.0), closely=False, points=5)
