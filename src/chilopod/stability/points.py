@@ -44,7 +44,7 @@ class Kind(Labelled):
     PERIOD_DOUBLING = "period doubling", "an orbit of twice the period branches off"
     NEIMARK_SACKER = "Neimark-Sacker", "an oscillation at a second frequency branches off: an invariant torus"
     BRANCH_POINT = "branch point", "another orbit branches off; the coefficients do not tell how"
-    COLLISION = "collision", "of a conservative system, two multipliers meet at +1 or -1 and leave the unit circle"
+    COLLISION = "collision", "of a conservative system, two multipliers meet at +1 or -1"
     KREIN_COLLISION = "Krein collision", "of a conservative system, two pairs meet on the unit circle and leave it"
     HOPF = "Hopf", "an equilibrium changes stability and a cycle branches off"
 

@@ -81,7 +81,7 @@ class Crossing:
     multiplicity: int  # number of multipliers on the circle, counting both of a pair
     change: int  # rise of the number outside; 0 for a touch; at an end of the interval for a continued motion
     multiplier: complex  # critical multiplier, the one with positive imaginary part of a pair
-    collision: bool = False  # True if they meet on the circle and leave it, or come back: a conservative family
+    collision: bool = False  # True if they meet on the circle: a conservative family
     around: tuple[float, float] = (0.0, 0.0)  # evaluated values on both sides without another root, if known
 
 
