@@ -4,6 +4,8 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import mathieu_b
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Kind, PeriodicSystem, from_map, from_rhs, locate, multipliers
@@ -308,11 +310,33 @@ def test_a_fold_is_within_the_bound_of_the_pitchfork_that_it_nearly_is(miss):
     assert abs(point.value - 3.0 * np.cbrt(miss / 2.0) ** 2) <= point.bifurcation.error_bound < 1e-8
 
 
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_the_mode_of_a_collision_in_a_family_by_energy_is_no_direction_of_the_family(symmetric):
+    """Orbits x = a cos(t) with z'' + (k + x^2) z = 0 across, Mathieu's equation: z = se_1(t + pi / 2), even, is one."""
+    symmetry = np.diag([1.0, -1.0, 1.0, -1.0]) if symmetric else None
+
+    def family(p):
+        def rhs(t, state):
+            x, z, u, w = state
+            gx, gz = x * (1.0 + z * z), z * (0.8 + x * x)
+            return [u + p * gx, w + p * gz, -gx + p * u, -gz + p * w]
+
+        return from_rhs(rhs, 4, None, guess_period=6.28, spatial_symmetry=symmetry, scale=np.ones(4))
+
+    q = brentq(lambda q: 0.8 + 2.0 * q - mathieu_b(1, q), 0.0, 0.2)
+    (point,) = follow(family, begin(family, 0.0, [0.5, 0.0, 0.0, 0.0]), (-0.1, 0.1), points=1).special_points
+    assert point.special is Kind.COLLISION
+    assert point.orbit == pytest.approx([2.0 * np.sqrt(q), 0.0, 0.0, 0.0], abs=1e-11)
+    mode = point.bifurcation.mode
+    assert mode / mode[1] == pytest.approx([0.0, 1.0, 0.0, 0.0], abs=1e-9)
+
+
 def test_no_direction_is_made_up_at_a_collision_that_determines_none():
     (meeting,) = locate(turning, (2.5, 4.0), orbit=[0.0, 0.0])
     (special,) = follow(turning, begin(turning, 2.5, [0.0, 0.0]), (2.5, 4.0)).special_points
     for point in (meeting, special.bifurcation):
         assert point.kind is Kind.COLLISION
+        assert "leave" not in point.sentences
         assert point.modes.shape == (2, 2)
         assert abs(point.value - np.pi) <= point.error_bound
         with pytest.raises(ParameterError, match=r"has 2 critical modes, which do not determine .* with `begin`$"):

@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 from numpy.polynomial import Legendre
+from scipy.linalg import schur
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.carrying import numerical_balance
@@ -219,24 +220,28 @@ def described(
     """Bifurcation point at a ``place``: a value of the parameter, and its error bound, to which round-off is added. The
     critical multipliers belong to the whole return map; their block and the kind of the point are given if known."""
     (value, error_bound), event, returns = place, crossing.event, orbit.image.returns
-    spec = spectrum(orbit.image)
+    # Another block may have a multiplier there too, such as the one of a family by energy.
+    within = orbit.image.jacobian if block is None else block.basis @ (block.dual @ orbit.image.jacobian)
+    spec = spectrum(replace(orbit.image, jacobian=within))
     critical = critical_multipliers(spec, crossing)
     simple = critical.size == (2 if event is CircleEvent.PAIR else 1)
     breaking = block is not None and not block.trivial
     # At +1 the normal form, or a broken symmetry, determines the kind.
     unknown = kind is None and event is CircleEvent.PLUS and not crossing.collision
+    krein = crossing.collision and event is CircleEvent.PAIR
+    meeting = crossing.collision and not krein
+    if meeting and (shared := _shared_direction(within, TARGETS[event])) is not None:
+        spec = replace(spec, right=np.where(np.arange(spec.values.size) == critical[0], shared[:, None], spec.right))
     nu, mode, left, frequency = _critical(system, orbit, spec, int(critical[0]), event)
     formed = simple and (with_normal_form or (unknown and not breaking)) and not crossing.collision
     form = _formed(system, orbit, event, nu, mode, left) if formed else None
     # No orbits branch off from a Krein collision, whatever the symmetries.
-    krein = crossing.collision and event is CircleEvent.PAIR
     symmetry = None if block is None or krein else symmetric_crossing(block, event, returns)
     several = not simple or (form is not None and form.status is NormalFormStatus.SEVERAL_CRITICAL)
     if unknown and several and _is_continuum(system, orbit, mode):
         count = int((np.abs(spec.values - 1.0) <= _CRITICAL).sum())
         said = f"orbits beside this one are periodic too: they form a continuum (multipliers at one: {count})"
         raise ContinuumError(said)
-    meeting = crossing.collision and not krein
     apart = meeting and _have_own_modes(orbit.image.jacobian, crossing, block)
     axial = symmetry is not None and bool(symmetry.branches)
     single = simple or (meeting and not (apart or axial))
@@ -428,6 +433,23 @@ def _have_own_modes(jacobian: Array, crossing: Crossing, block: Block | None) ->
     stretches = np.linalg.svd(matrix)[1]
     there = int((np.abs(np.linalg.eigvals(matrix)) <= _MEETING).sum())
     return int((stretches <= _CRITICAL * max(1.0, stretches[0])).sum()) >= max(there, 2)
+
+
+def _shared_direction(jacobian: Array, target: float) -> ComplexArray | None:
+    """The eigenvector of two multipliers that meet at +1 or -1, which ends their Jordan chain; None if they are not
+    there. The direction of a family by energy, also to +1, belongs to no chain."""
+    units = numerical_balance(np.abs(jacobian) + np.eye(len(jacobian)))
+    scaled = jacobian * units / units[:, None]
+    triangle, vectors, count = schur(scaled, sort=lambda re, im: math.hypot(re - target, im) <= _MEETING)
+    if count < 2:
+        return None
+    chain = step = triangle[:count, :count] - target * np.eye(count)
+    for _ in range(count - 2):  # a longer one at an extremum of the energy
+        longer = chain @ step
+        if np.linalg.norm(longer) <= _MEETING * np.linalg.norm(chain) * np.linalg.norm(step):
+            break
+        chain = longer
+    return np.asarray(units * (vectors[:, :count] @ np.linalg.svd(chain)[0][:, 0]), dtype=np.complex128)
 
 
 def kind_at_plus_one(form: NormalForm | None) -> Kind:

@@ -153,7 +153,8 @@ def own_return(system: SystemLike, x: Array) -> Iterator[Nodes]:
 def _marched(system: Autonomous, x: Array, periods: int) -> tuple[Array, Array, list[int]]:
     """Times of a motion over guessed periods, its states, and the numbers of those that come back near the first."""
     # One step more shows whether the motion goes away again after the last one.
-    times, path = np.arange(periods * _MARCHED + 2) * (system.guess_period / _MARCHED), [x]
+    times = np.linspace(0.0, (periods + 1.0 / _MARCHED) * system.guess_period, periods * _MARCHED + 2)
+    path = [x]
     for _ in times[1:]:
         path.append(carried(system, path[-1][None], 0.0, float(times[1]))[0])
     states = np.array(path)
