@@ -1,6 +1,7 @@
 """Systems from anything that has a flow, and how sure their multipliers are."""
 
 import itertools
+from functools import partial
 from math import exp, pi
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from chilopod.stability import (
     Multipliers,
     PeriodicSystem,
     SystemLike,
+    begin,
     exponents,
     find_orbit,
     from_map,
@@ -207,6 +209,38 @@ def test_a_search_that_fails_where_a_function_overflows_names_it():
     system = from_rhs(rhs, 2, 2.0 * np.pi)
     with pytest.raises(AnalysisError, match="of its size\\): the right-hand side overflows: exp of"):
         find_orbit(system, [0.5, 0.5])
+
+
+def test_a_map_may_overflow_in_a_search_whose_error_names_the_value():
+    """The map x -> 1 - a x^2 + 0.3 x has no fixed point below a = -0.1225."""
+    quadratic = lambda a: from_map(lambda x: ([1.0 - a * x[0] ** 2 + 0.3 * x[0]], [[0.3 - 2.0 * a * x[0]]]), 1)  # noqa: E731
+    for search in (partial(begin, quadratic, -0.4), partial(locate, quadratic, (-0.4, 1.4))):
+        with pytest.raises(AnalysisError, match=r"^orbit: at -0\.4 no periodic orbit found near the guess"):
+            search([0.6])
+
+
+@pytest.mark.parametrize("method", ["taylor", "implicit"])
+@pytest.mark.parametrize(("rate", "said"), [(360.0, None), (500.0, "deviations grow"), (690.0, "deviations grow")])
+def test_multipliers_beyond_double_precision_are_named_without_a_warning(method, rate, said):
+    """Squares of the multiplier exp(rate) overflow, and then products with the sizes of states do."""
+    system = from_rhs(lambda t, x: [rate * x[0] + np.cos(2.0 * np.pi * t)], 1, 1.0, method=method)
+    if said is None:
+        assert multipliers(system, [0.0]).values == pytest.approx([np.exp(rate)], rel=1e-9)
+    else:
+        with pytest.raises(AnalysisError, match=said):
+            multipliers(system, [0.0])
+
+
+@pytest.mark.parametrize("name", ["flow", "flow_with_error"])
+def test_a_flow_takes_a_list(name):
+    """States that decay by exp(-1), by every method."""
+    rhs = lambda t, x: [-x[0]]  # noqa: E731
+    untraceable = lambda t, x: [-x[0] if x[0] > 0.0 else -1.0 * x[0]]  # noqa: E731
+    systems = [from_rhs(rhs, 1, 1.0, method=method) for method in ("automatic", "taylor", "implicit")]
+    systems += [from_rhs(untraceable, 1, 1.0), from_map(lambda x: ([np.exp(-1.0) * x[0]], [[np.exp(-1.0)]]), 1)]
+    for system in systems:
+        state, derivative, *_ = getattr(system, name)([2.0], 0.0, 1.0)
+        assert (state, derivative) == (pytest.approx([2.0 / np.e]), pytest.approx(np.array([[1.0 / np.e]])))
 
 
 def test_a_defective_matrix_has_a_useless_but_honest_bound():

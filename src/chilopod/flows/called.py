@@ -65,13 +65,13 @@ class CalledFlow:
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""
-        parts = self._parts(t0, t1)
+        x, parts = np.asarray(x, dtype=np.float64), self._parts(t0, t1)
         sizes = self._sizes(x, parts)
         return self._over(x, parts, self.tolerance, sizes, self._gradient(x, sizes)[0])
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         """State and derivative, with a bound on the error of each entry of the derivative."""
-        parts = self._parts(t0, t1)
+        x, parts = np.asarray(x, dtype=np.float64), self._parts(t0, t1)
         sizes = self._sizes(x, parts)
         gradient, floor = self._gradient(x, sizes)
         state, derivative = self._over(x, parts, self.tolerance, sizes, gradient)

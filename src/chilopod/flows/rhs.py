@@ -273,6 +273,7 @@ def _either(taylor: Members, implicit: Callable[[], ImplicitFlow]) -> Members:
     def either(name: str) -> Callable[..., Any]:
         def flow(x: Array, t0: float, t1: float) -> Any:  # of this module: its derivative needs no comparison
             nonlocal latest
+            x = np.asarray(x, dtype=np.float64)
             try:
                 found = taylor[name](x, t0, t1)
             except TooManySteps as first:

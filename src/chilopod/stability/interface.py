@@ -143,7 +143,7 @@ def checked_flow(
     deadline.check()
     name, n = "flow_with_error" if with_error else "flow", x.size
     function = getattr(system, name)
-    with UserCode(name):
+    with UserCode(name), np.errstate(all="ignore"):  # values that are not finite are refused
         found: Any = function(np.array(x), t0, t1)  # a system may write into its argument
     if not (isinstance(found, tuple | list) and len(found) == 2 + with_error):
         what = "(state, derivative, error)" if with_error else "(state, derivative)"

@@ -396,7 +396,7 @@ def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
     """States at t1 of those at t0, shape (states, n) both, by the cheapest way; a SpentError after a limit."""
     deadline.check()
     if offers(system, "flow_states"):
-        with UserCode("flow_states"):
+        with UserCode("flow_states"), np.errstate(all="ignore"):
             return numbers(system.flow_states(states, t0, t1), states.shape, "flow_states")
     if offers(system, "flow_tangents"):
         with UserCode("flow_tangents"):

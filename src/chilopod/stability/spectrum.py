@@ -123,7 +123,7 @@ def spectrum(image: ReturnMap) -> Spectrum:
     scaled = jacobian * units / units[:, None]
     values, right, left = eigensystem(scaled)
     # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
-    with np.errstate(invalid="ignore"):  # left ones of a defective multiplier are infinite, and so is its error
+    with np.errstate(all="ignore"):  # left ones of a defective multiplier are infinite, and so is its error
         error = 4.0 * EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
         right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
     # Squares of tiny entries vanish; a power of 2 as a unit is exact.

@@ -221,7 +221,7 @@ def from_rhs(
         _STATED[key] = stated
     slopes, members = stated.given.flows(rhs, args, stated.claims[0])
     if period is None:
-        members.setdefault("velocity", lambda x: slopes(np.zeros(1), x[:, None])[:, 0])
+        members.setdefault("velocity", lambda x: slopes(np.zeros(1), np.asarray(x)[:, None])[:, 0])
     found, first = slopes(stated.times, stated.states), 0
     try:
         for claim in stated.claims:
@@ -315,7 +315,7 @@ def from_map(
         return numbers(pair[0], (n,), "image"), numbers(pair[1], (n, n), "image")
 
     def iterated(x: Array, t0: float, t1: float, compared: bool = False) -> tuple[Array, Array, Array]:
-        derivative, reach = np.eye(n), np.eye(n)
+        x, derivative, reach = np.asarray(x, dtype=np.float64), np.eye(n), np.eye(n)
         for _ in range(math.ceil(t1) - math.ceil(t0)):
             start, (x, factor) = x, applied(x)
             if is_due(image, compared):
@@ -326,7 +326,7 @@ def from_map(
 
     def flow_with_error(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         state, derivative, reach = iterated(x, t0, t1, compared=True)
-        shaken = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
+        shaken = np.asarray(x) * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
         other = iterated(shaken, t0, t1)[1]
         rounding = _ROUNDING * n * max(1, math.ceil(t1) - math.ceil(t0)) * reach
         return state, derivative, REPEATED * np.abs(other - derivative) + rounding

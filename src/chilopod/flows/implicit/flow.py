@@ -60,12 +60,13 @@ class ImplicitFlow(ReadOnlyArrays):
         """The same with a bound on the error of every entry of the derivative: a multiple of the larger difference from
         two other computations, of lower order and of smaller steps, from disturbed starts, and round-off."""
         state, derivative, _ = self._run(x, (t0, t1), _STAGES)
-        shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
+        shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(self.tape.dimension) + 1.0))
         lower = self._run(x * (1.0 + shake), (t0, t1), _OTHER_STAGES)[1]
         finer = self._run(x * (1.0 - shake), (t0, t1), _STAGES, _FINER)[1]
         difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
         size = np.abs(derivative)
-        return state, derivative, REPEATED * difference + _ROUNDING * (size + size @ size)
+        with np.errstate(over="ignore"):  # an infinite bound
+            return state, derivative, REPEATED * difference + _ROUNDING * (size + size @ size)
 
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""

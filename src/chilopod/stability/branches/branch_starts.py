@@ -128,8 +128,9 @@ def begin(
         try:
             found = searched_orbit(studied, guess, with_error=False, shortest=periods == 1)
             found = past_event(studied, found.state, found.image.duration) or found
-        except AnalysisError:
+        except AnalysisError as error:
             _check_moving(system, guess)
+            error.problem = f"at {value:.9g} {error.problem}"
             raise
         _check_periods(studied, found, periods)
     return Start(value, found.state, rising, periods=periods, period=found.period if is_autonomous(system) else None)

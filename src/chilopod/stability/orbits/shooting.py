@@ -79,7 +79,9 @@ class Free:
 
 def node_count(jacobian: Array, sizes: Array) -> int:
     """Number of nodes with little growth of deviations in between, from the derivative of a return."""
-    growth = float(np.linalg.svd(jacobian * sizes / sizes[:, None], compute_uv=False)[0])
+    with np.errstate(over="ignore"):
+        matrix = jacobian * sizes / sizes[:, None]
+    growth = float(np.linalg.svd(matrix, compute_uv=False)[0]) if np.isfinite(matrix).all() else np.inf
     return int(np.clip(np.ceil(np.log(max(growth, 1.0)) / np.log(_GROWTH)), 1, _MOST))
 
 
@@ -113,16 +115,17 @@ def shot(problem: Problem, start: Nodes, sizes: Array, section: Section | None) 
     ``sizes`` of the states, shape (n,), grow with these while the parameter is given. The first state has a ``section``
     if the system has no period of its own.
     """
-    equations, best = _Equations(problem, start, _Frame(sizes, sizes, section, problem.careful)), np.inf
-    if problem.free is None:
-        return _damped(equations, start)
-    for _ in range(FEW_ROUNDS):
-        if NODES.met(equations.residual, best):
-            return equations.closed()
-        if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
-            break
-        best = min(best, equations.residual)
-        equations = equations.after(equations.correction(equations, _CUTOFF), 1.0)
+    with np.errstate(all="ignore"):  # values that are not finite are refused
+        equations, best = _Equations(problem, start, _Frame(sizes, sizes, section, problem.careful)), np.inf
+        if problem.free is None:
+            return _damped(equations, start)
+        for _ in range(FEW_ROUNDS):
+            if NODES.met(equations.residual, best):
+                return equations.closed()
+            if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
+                break
+            best = min(best, equations.residual)
+            equations = equations.after(equations.correction(equations, _CUTOFF), 1.0)
     raise _not_found(best)
 
 
@@ -210,8 +213,7 @@ class _Equations:
         if free is not None:
             moved = (np.append(x, nodes.value) - free.start) / np.append(sizes, free.scale)
             self._missing = float(free.row @ moved - free.target)
-        with np.errstate(all="ignore"):  # a motion that is not finite is refused below
-            self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
+        self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
         self.frame = frame._replace(sizes=sizes, reach=np.minimum(sizes, frame.reach))
         if not math.isfinite(self.residual):
             lost = np.flatnonzero(~np.isfinite(self._ends).all(axis=1))
@@ -223,8 +225,7 @@ class _Equations:
         if self._problem.shared is None:
             return states
         basis = np.linalg.qr(self._problem.shared / sizes[:, None])[0]
-        with np.errstate(all="ignore"):  # values that are not finite are refused later
-            return np.asarray(states / sizes @ basis @ basis.T * sizes)
+        return np.asarray(states / sizes @ basis @ basis.T * sizes)
 
     def _to_nodes(self, system: SystemLike) -> None:
         """Carry every node to the next one, and beside it by a neighbouring system if the parameter is unknown."""
@@ -242,8 +243,7 @@ class _Equations:
             try:
                 self._ends[i], self._linear[i, :, :n] = checked_flow(system, x, a, b)
                 if beside is not None:
-                    with np.errstate(all="ignore"):  # values that are not finite are refused later
-                        self._linear[i, :, n + 1] = (carried(beside, x[None], a, b)[0] - self._ends[i]) / step
+                    self._linear[i, :, n + 1] = (carried(beside, x[None], a, b)[0] - self._ends[i]) / step
             except AnalysisError as error:
                 if m == 1:
                     raise
@@ -356,6 +356,8 @@ def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, 
         if len(matrix) > len(basis):
             basis = block_diag(basis, 1.0)  # the parameter
         return np.asarray(basis @ _solution(basis.T @ matrix @ basis, basis.T @ right, cutoff, None, sizes))
+    if not np.isfinite(matrix).all():
+        raise AnalysisError("deviations grow beyond double precision within a return", field="orbit")
     try:
         if cutoff == _SINGULAR:
             _, _, regular, singular = dgesv(matrix, right)

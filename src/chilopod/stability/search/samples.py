@@ -89,7 +89,11 @@ class Samples:
         self.orbits, allowed = budget, _RETURNS * budget
         self.budget = Budget(max(allowed, _FIRST), seconds)
         with self.budget, UserCode("family", low):
-            self.first = searched_orbit(self.family(low), guess, budget=self.budget)
+            try:
+                self.first = searched_orbit(self.family(low), guess, budget=self.budget)
+            except AnalysisError as error:
+                error.problem = f"at {low:.9g} {error.problem}"
+                raise
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
             events = events_in(self.family(low), self.first.state, self.first.period)
         error = np.nan_to_num(self.first.image.error, posinf=1.0) * self.size / self.size[:, None]
