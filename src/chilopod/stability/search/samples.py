@@ -96,8 +96,8 @@ class Samples:
                 raise
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
             events = events_in(self.family(low), self.first.state, self.first.period)
-        error = np.nan_to_num(self.first.image.error, posinf=1.0) * self.size / self.size[:, None]
-        self._rounding = float(np.clip(error.max(), *_ROUNDING))  # which decides the side so close to +1
+        noise = np.nan_to_num(self.first.image.error, posinf=1.0) * self.size / self.size[:, None]
+        self._rounding = float(np.clip(noise.max(), *_ROUNDING))  # which decides the side so close to +1
         self.budget.left, self.budget.taken = allowed, 0.0  # without the first orbit
         self.known = guess is None and self.family.timed
         if not self.known:
