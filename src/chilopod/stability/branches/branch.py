@@ -71,7 +71,7 @@ class Branch(Result):
     remarks
         Sentences on events that remained undecided.
     anchor
-        What a continuation needs beside the points; found anew if None.
+        State of the continuation beside the points; found anew if None.
     """
 
     points: tuple[BranchPoint, ...]

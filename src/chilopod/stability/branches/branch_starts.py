@@ -130,7 +130,8 @@ def begin(
             found = past_event(studied, found.state, found.image.duration) or found
         except AnalysisError as error:
             _check_moving(system, guess)
-            error.problem = f"at {value:.9g} {error.problem}"
+            if error.field == "orbit":
+                error.problem = f"at {value:.9g} {error.problem}"
             raise
         _check_periods(studied, found, periods)
     return Start(value, found.state, rising, periods=periods, period=found.period if is_autonomous(system) else None)

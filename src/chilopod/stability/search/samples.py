@@ -92,7 +92,8 @@ class Samples:
             try:
                 self.first = searched_orbit(self.family(low), guess, budget=self.budget)
             except AnalysisError as error:
-                error.problem = f"at {low:.9g} {error.problem}"
+                if error.field == "orbit":
+                    error.problem = f"at {low:.9g} {error.problem}"
                 raise
             self.size = sizes(self.family(low), self.first.state, self.first.image.duration)
             events = events_in(self.family(low), self.first.state, self.first.period)

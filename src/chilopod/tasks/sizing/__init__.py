@@ -120,7 +120,7 @@ class Sizing(Summary, ReadOnlyArrays):
         return finite(float(end[name])) if name and (name == "speed" or is_curved(end)) else None
 
     def _meets(self, wish: Wish, engine: str) -> bool | None:
-        """Whether a walk meets a wish, within the tolerance of a planar one; None for what no walk shows."""
+        """True if a walk meets a wish, within the tolerance of a planar one; None for what no walk shows."""
         walked = self._walked(wish, engine)
         meets = walked is not None and abs(wish.deviation(walked)) <= _AS_COMPUTED
         return meets if wish.quantity in _OF_WALK else None
