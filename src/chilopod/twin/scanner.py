@@ -14,7 +14,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from chilopod.frozen import Array
+from chilopod.frozen import Array, read_only
 from chilopod.robot import Twin
 from chilopod.twin.model import POLE_GROUP, scanner_place
 
@@ -30,10 +30,11 @@ def beams(twin: Twin) -> Array:
 
 @lru_cache(maxsize=64)
 def _beams(view: float, step: float) -> tuple[Array, Array]:
-    """Angles of all beams, rad, and their unit vectors in the frame of module 1, (beams, 3), not to be written into."""
+    """Angles of all beams, rad, and their unit vectors in the frame of module 1, (beams, 3), read-only."""
     half = round(0.5 * view / step)
     angles = np.arange(-half, half + 1, dtype=np.float64) * step
-    return angles, np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
+    vectors = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
+    return read_only(angles), read_only(vectors)
 
 
 class Scanner:

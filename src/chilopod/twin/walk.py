@@ -20,7 +20,7 @@ from chilopod.engine.arguments import as_array, as_marks, as_seeds, check_time, 
 from chilopod.engine.batch import BatchWalk, Beginning
 from chilopod.engine.contract import Marks
 from chilopod.engine.saved import part
-from chilopod.frozen import Array
+from chilopod.frozen import Array, read_only
 from chilopod.record import Recording, Samples, check_size, quantity, walk_record
 from chilopod.robot import Robot
 from chilopod.twin.failures import failures
@@ -367,10 +367,9 @@ def state_size(plan: TwinModel, initial: ArrayLike | None) -> int:
 
 @lru_cache(maxsize=32)
 def _targets(robot: Robot, first: int, count: int) -> Array:
-    """Servo targets of all hips and knees from a tick on, (count, legs times 2), shared between walks and not to be
-    written into."""
+    """Servo targets of all hips and knees from a tick on, (count, legs times 2), read-only."""
     targets = servo_targets(robot, np.arange(first, first + count) * twin_of(robot).control_interval)
-    return targets.reshape(count, -1)
+    return read_only(targets.reshape(count, -1))
 
 
 def _heading(turn: Array) -> Array:
