@@ -1,5 +1,7 @@
 """Branches against curves that are known in closed form."""
 
+import pickle
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -81,6 +83,24 @@ def test_steep_returns_in_pieces_as_in_one():
     assert [point.orbit.tolist() for point in pieces.points] == [point.orbit.tolist() for point in whole.points]
     for point in whole.points:
         assert np.expm1(20.0 * point.value) == pytest.approx(1.5 * point.orbit[0] + point.orbit[0] ** 3, rel=1e-8)
+
+
+def test_a_branch_whose_end_is_another_point_is_continued_from_that():
+    """x = +-sqrt(p): the kept state of one half is not that of the other."""
+
+    def family(p):
+        return from_map(lambda x: (x + 0.1 * (p - x * x), [[1.0 - 0.2 * x[0]]]), 1)
+
+    piece = follow(family, [1.0], (1.0, 4.0), points=4)
+    whole, pickled = (follow(family, each, (1.0, 4.0)) for each in (piece, pickle.loads(pickle.dumps(piece))))
+    assert [each.orbit.tolist() for each in pickled.points] == [each.orbit.tolist() for each in whole.points]
+    end = piece.points[-1]
+    other = replace(
+        end, orbit=-end.orbit, multipliers=1.0 + 0.2 * end.orbit.astype(complex), tangent=[-1, 1] * end.tangent
+    )
+    mirrored = follow(family, replace(piece, points=(*piece.points[:-1], other)), (1.0, 4.0))
+    assert all(point.orbit[0] == pytest.approx(-np.sqrt(point.value)) for point in mirrored.points[5:])
+    assert mirrored.points[-1].value == 4.0
 
 
 def test_renewed_units_leave_the_steps_as_long_as_they_are():

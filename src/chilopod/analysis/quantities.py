@@ -272,11 +272,9 @@ class Measured:
         """Cubic coefficient of the normal form at the onset, 1/rad^2."""
         found = self.number.first(robot, normal_form=True)
         if found.coefficient is None:
-            kind, place = (
-                found.point.kind.label,
-                self._place(robot.with_value(self.number.parameter, found.point.value)),
-            )
-            raise AnalysisError(f"the onset has no cubic coefficient: its kind is {kind}", **place)
+            there = robot.with_value(self.number.parameter, found.point.value)
+            said = f"the onset has no cubic coefficient: its kind is {found.point.kind.label}"
+            raise AnalysisError(said, **self._place(there))
         return found.coefficient
 
     def growth(self, robot: Robot) -> float:
@@ -339,9 +337,7 @@ class Measured:
         """State at time 0 of the curved walk that leaves the straight one at the onset, shape (2N+1,); AnalysisError if
         the robot walks straight, or the branch does not reach it."""
         if self.growth(robot) <= 0.0:
-            allowed = (
-                "a value at which it is unstable; `chilopod branch` finds curved walks beside a stable straight one"
-            )
+            allowed = "one at which it is unstable; `chilopod branch` finds curved walks beside a stable straight one"
             raise AnalysisError("the straight walk is stable there", **self._place(robot), allowed=allowed)
         model = PlanarModel(robot, use_symmetry=False)
         found = None if self.near is None else _corrected(model, *self.near)

@@ -364,12 +364,12 @@ def event_beside(system: SystemLike, x: Array, time: float, ahead: Callable[[flo
             return EVENT_AT_ZERO
         # A very unstable orbit meets other events on both sides.
         if has_events(system, x, time) and jumps_within(seen, 0.0, _PAST) and not jumps_within(seen, 0.0, -_PAST):
-            low, high = 0.0, _PAST
-            if events(low) == events(high):
+            low, high, here = 0.0, _PAST, events(0.0)
+            if events(high) == here:
                 return JUMPS_AHEAD
             for _ in range(_CLOSER):
                 middle = 0.5 * (low + high)
-                low, high = (middle, high) if events(middle) == events(0.0) else (low, middle)
+                low, high = (middle, high) if events(middle) == here else (low, middle)
             # An event that is late, as where a motion slows down, passes the end of the time instead.
             return GRAZES if any(events(low, part) != events(high, part) for part in _ROUND_END) else ""
     return ""

@@ -189,7 +189,8 @@ def follow(
 ) -> Branch:
     """Follow a branch from a point along its tangent, or from its end; an AnalysisError if no orbit is found there.
 
-    The points of a continued branch equal those of a single run to the bit. A closed branch cannot be continued.
+    The points of a continued branch equal those of a single run to the bit; without its ``anchor``, as one that is read
+    from a file of walks, to round-off. A closed branch cannot be continued.
 
     Parameters
     ----------
@@ -273,7 +274,7 @@ def _reopened(curve: Curve, branch: Branch, longest: float) -> tuple[Branch, Anc
     if n != end.orbit.size:
         raise ParameterError("must have the branch's dimension", field="family", value=n, allowed=allowed)
     step = min(branch.step, longest) if longest < LONGEST else branch.step  # those along straight parts are longer
-    if branch.anchor is not None and branch.anchor.last.value == end.value:
+    if branch.anchor is not None and branch.anchor.last is end:
         return replace(branch, step=step), branch.anchor
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     # At a branch point the matrix is singular, so it is computed a step ahead.
